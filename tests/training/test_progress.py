@@ -11,7 +11,7 @@ import pytest
 from racecraft.learn import IterationStats, UpdateStats
 from racecraft.learn.ledger import Ended
 from racecraft.training import EvaluationReport, IterationReport, TrainResult
-from racecraft.training.progress import SilentReporter
+from racecraft.training.progress import Lesson, SilentReporter
 
 LOSSES: dict[str, float] = {
     "policy_loss": 0.1,
@@ -70,6 +70,8 @@ def test_an_iterations_point_by_hand() -> None:
         **{name: LOSSES[name] for name in ("policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction")},
         "explained_variance": 0.7,
     }
+    lesson = Lesson(steps=4096, needed=12288, steps_per_second=9.0)
+    assert replace(report, lesson=lesson).point() == {**report.point(), "lesson": 0.3333}
 
 
 def test_a_result_has_milliseconds(tmp_path: Path) -> None:

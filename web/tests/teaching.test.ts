@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { hasTeacherNow } from "../src/lib/teaching";
+import { hasTeacherNow, lessonOf } from "../src/lib/teaching";
 
 describe("a training with a teacher", () => {
   it("has one until the cars take their first step", () => {
@@ -9,5 +9,12 @@ describe("a training with a teacher", () => {
       false,
     ]);
     expect([undefined, 0, 512].some((step) => hasTeacherNow({ algorithm: "ppo" }, step))).toBe(false);
+  });
+
+  it("is told how much the teacher has learned, until its student has driven", () => {
+    const point = { kind: "iteration" as const, step: 0, seconds: 1 };
+    const told = (lesson: unknown, steps = 0) => lessonOf({ ...point, lesson }, steps);
+    expect([0, 0.29, 0.4267, 0.9999, 1].map((lesson) => told(lesson))).toEqual([0, 0.29, 0.42, 0.99, 1]);
+    expect([lessonOf(undefined, 0), lessonOf(point, 0), told(null), told(1, 512)]).toEqual([null, null, null, null]);
   });
 });

@@ -1,6 +1,7 @@
 """The curves of a training, a line of JSON for every point, so that a viewer can follow the file as it grows.
 
     {"kind": "iteration", "step": 4096, "seconds": 0.61, "reward": 31.2, "completion": 0.44, ...}
+    {"kind": "iteration", "step": 0, "seconds": 0.35, ..., "lesson": 0.02}  of a teacher: how much it has learned
     {"kind": "evaluation", "step": 4096, "seconds": 0.70, "completions": [1.0, ...], "lap_times": [9.1], ...}
     {"kind": "note", "step": 4096, "seconds": 0.70, "text": "..."}
 

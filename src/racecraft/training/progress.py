@@ -105,8 +105,9 @@ class IterationReport:
     """Where the iteration was a teacher's; there were no camera steps in it."""
 
     def point(self) -> dict[str, Any]:
-        """For the run's history; NaN is what is not known yet."""
+        """For the run's history; NaN is what is not known yet. Only a teacher's has a `lesson`: its share, 0 to 1."""
         losses = self.stats.losses
+        lesson = {} if self.lesson is None else {"lesson": round(self.lesson.share, 4)}
         return {
             "step": self.stats.total_steps,
             "seconds": round(self.seconds, 3),
@@ -122,6 +123,7 @@ class IterationReport:
             "approx_kl": losses.approx_kl,
             "clip_fraction": losses.clip_fraction,
             "explained_variance": self.stats.explained_variance,
+            **lesson,
         }
 
     def scalars(self) -> dict[str, float]:

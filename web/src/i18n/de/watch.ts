@@ -71,6 +71,9 @@ export const watch: Record<keyof typeof english, string> = {
     "{count} {count|Auto wartet|Autos warten}, während das Netz aus {count|seiner Fahrt|ihren Fahrten} lernt: seit {time}",
   cars_teacher:
     "Zuerst lernt ein Lehrer, dem alles gesagt wird: seit {time}. Von ihm {count|lernt|lernen} dann {count} {count|Auto|Autos}",
+  cars_lesson:
+    "Zuerst lernt ein Lehrer, dem alles gesagt wird: {learned} nach {time}. Von ihm {count|lernt|lernen} dann {count} {count|Auto|Autos}",
+  curve_lesson: "Der Lehrer hat {learned} seines Stoffs gelernt; die Kurve beginnt mit den Autos, die von ihm lernen.",
   cars: "{count} {count|Auto lernt|Autos lernen zugleich}",
   on_machine: "{told} · auf {machine}",
   not_live: "Gerade wird nicht trainiert.",

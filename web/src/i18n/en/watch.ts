@@ -67,6 +67,9 @@ export const watch = {
     "{count} {count|car waits|cars wait} while the network learns from what {count|it|they} drove: {time} so far",
   cars_teacher:
     "A teacher, told where everything is, learns first: {time} so far. {count} {count|car|cars} will learn from it",
+  cars_lesson:
+    "A teacher, told where everything is, learns first: {learned} after {time}. {count} {count|car|cars} will learn from it",
+  curve_lesson: "The teacher has learned {learned} of its lessons; the curve begins with the cars that learn from it.",
   cars: "{count} {count|car learning|cars learning at once}",
   on_machine: "{told} · on {machine}",
   not_live: "No training is running.",
