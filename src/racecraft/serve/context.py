@@ -274,6 +274,13 @@ async def _computes(request: Request) -> AsyncIterator[None]:
         yield
 
 
+async def _asks_provider(consoles: InLeague) -> AsyncIterator[None]:
+    async with consoles.provider.place():
+        yield
+
+
+AsksProvider = Depends(_asks_provider)
+"""A route with this dependency asks the provider, and waits until there is a place to."""
 Computes = Depends(_computes)
 """A route with this dependency takes a thread for a while: somebody's follow one another, two at a time."""
 MakesModel = Depends(_makes_model)

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Request, Response
 
 from racecraft.errors import ConfigError
-from racecraft.serve.context import InConsoles, InPerson
+from racecraft.serve.context import AsksProvider, InConsoles, InPerson
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.known_browsers import remember
 from racecraft.serve.people.keys import SESSION_ID, digest_of
@@ -107,7 +107,7 @@ def get_provider(consoles: InConsoles, person: InPerson) -> ProviderLink | None:
     )
 
 
-@router.post("/provider")
+@router.post("/provider", dependencies=[AsksProvider])
 def begin_link(request: Request, response: Response, consoles: InConsoles, person: InPerson) -> ToProvider:
     """To the provider, so that one comes in through it from now on, too."""
     consoles.tries.begins("provider", address=caller(request))

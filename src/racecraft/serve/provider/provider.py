@@ -9,10 +9,10 @@ for somebody; e-mail addresses are looked at and forgotten.
 
 from __future__ import annotations
 
+import asyncio
 import logging
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import quote
@@ -32,7 +32,7 @@ from racecraft.serve.provider.visits import Newcomers, Visit, Visits, Whom
 from racecraft.serve.provider_settings import ProviderSettings
 
 AT_ONCE: Final = 8
-"""Sign-ins that ask the provider at the same time: one that hangs must not take all of the server's threads."""
+"""Sign-ins that ask the provider at the same time; who waits for a place has no thread, so others are not delayed."""
 PATIENCE: Final = 15.0  # s for a place among them
 MAX_NAME: Final = 100
 MAX_LOGGED: Final = 300  # characters of a reason, which may be what the provider sent
@@ -62,7 +62,26 @@ class Provider:
         self.newcomers = Newcomers()
         self._discovery = Discovery(settings)
         self._visits = Visits()
-        self._places = threading.BoundedSemaphore(AT_ONCE)
+        self._places = asyncio.Semaphore(AT_ONCE)
+
+    @asynccontextmanager
+    async def place(self) -> AsyncIterator[None]:
+        """To be held while the provider is asked; of the server's event loop.
+
+        Raises:
+            TooMany: Others wait for it already.
+        """
+        try:
+            async with asyncio.timeout(PATIENCE):
+                await self._places.acquire()
+        except TimeoutError as error:
+            raise TooMany(
+                f"Too many people sign in through {self.label} now.", hint="Try again in a moment."
+            ) from error
+        try:
+            yield
+        finally:
+            self._places.release()
 
     def begin(self, *, back: str, user_id: int | None) -> tuple[str, str]:
         """Somebody goes there.
@@ -232,10 +251,7 @@ class Provider:
 
         Raises:
             Unreachable: It does not answer as it should.
-            TooMany: Others wait for it already.
         """
-        if not self._places.acquire(timeout=PATIENCE):
-            raise TooMany(f"Too many people sign in through {self.label} now.", hint="Try again in a moment.")
         try:
             yield
         except NoAnswer as error:
@@ -243,8 +259,6 @@ class Provider:
             raise Unreachable(
                 f"{self.label} does not answer as it should.", hint="Try again in a moment, or come in another way."
             ) from error
-        finally:
-            self._places.release()
 
     def _log(self, error: NoAnswer) -> None:
         why = " ".join(str(error).split())[:MAX_LOGGED]

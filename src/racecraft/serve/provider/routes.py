@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl
 from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from racecraft.serve.context import Consoles, InLeague
+from racecraft.serve.context import AsksProvider, Consoles, InLeague
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.routes import fail, let_in, write_down
 from racecraft.serve.people.keys import digest_of
@@ -25,7 +25,7 @@ from racecraft.serve.settings import COOKIE, PROVIDER_COOKIE, PROVIDER_PAGE
 router = APIRouter(prefix="/api/door/provider", tags=["door"])
 
 
-@router.post("")
+@router.post("", dependencies=[AsksProvider])
 def begin_provider(request: Request, response: Response, consoles: InLeague) -> ToProvider:
     """To the provider's page."""
     provider = consoles.provider
@@ -37,7 +37,7 @@ def begin_provider(request: Request, response: Response, consoles: InLeague) -> 
     return ToProvider(to=to)
 
 
-@router.post("/arrival")
+@router.post("/arrival", dependencies=[AsksProvider])
 def sign_in_by_provider(request: Request, body: FromProvider, response: Response, consoles: InLeague) -> Arrived:
     """Back from there: in, or as somebody new, who has to choose a name; or with an account that is linked now."""
     from racecraft.serve.provider.provider import Answer  # there is one
@@ -98,8 +98,9 @@ def join_by_provider(request: Request, body: Newcomer, response: Response, conso
 )
 async def sign_out_by_provider(request: Request, consoles: InLeague) -> Response:
     """From the provider itself: it has signed somebody out, and so does the league (*back-channel logout*)."""
-    body = await request.body()
-    return await run_in_threadpool(_sign_out, request, consoles, body)
+    body = await request.body()  # before a place is taken: it may be long in coming
+    async with consoles.provider.place():
+        return await run_in_threadpool(_sign_out, request, consoles, body)
 
 
 def _sign_out(request: Request, consoles: Consoles, body: bytes) -> Response:
