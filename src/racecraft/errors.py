@@ -94,6 +94,10 @@ class RunError(RacecraftError, ValueError):
     """A run folder is missing, in use or unreadable."""
 
 
+class InUse(RunError):
+    """Another process, or another part of this one, holds what only one may hold."""
+
+
 class ReplayError(RacecraftError, ValueError):
     """A replay file is damaged, hostile, of another version, or not what a re-simulation gives."""
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from racecraft.errors import RunError
+from racecraft.errors import InUse, RunError
 from racecraft.run.lock import exclusive_lock
 
 ROOT = Path(__file__).parents[2]
@@ -22,7 +22,7 @@ with exclusive_lock(Path(sys.argv[1])):
 
 def test_second_holder_is_refused_with_the_first_one_named(tmp_path):
     path = tmp_path / ".lock"
-    refused = pytest.raises(RunError, match=f"in use by process {os.getpid()}")
+    refused = pytest.raises(InUse, match=f"in use by process {os.getpid()}")
     with exclusive_lock(path), refused, exclusive_lock(path):
         pass
     with exclusive_lock(path):

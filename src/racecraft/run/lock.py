@@ -1,4 +1,4 @@
-"""One trainer per run: a lock of the operating system on a file, which dies with its process."""
+"""One trainer per run, one server per league: a lock of the operating system on a file, which dies with its process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from racecraft import system
-from racecraft.errors import RunError
+from racecraft.errors import InUse, RunError
 
 
 @contextmanager
@@ -24,7 +24,8 @@ def exclusive_lock(path: Path, *, of: str = "") -> Iterator[None]:
         of: What it is for; by default the folder that it lies in.
 
     Raises:
-        RunError: Another process, or another part of this one, holds it.
+        InUse: Another process, or another part of this one, holds it.
+        RunError: It cannot be opened.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
@@ -34,7 +35,7 @@ def exclusive_lock(path: Path, *, of: str = "") -> Iterator[None]:
         try:
             system.lock(descriptor)
         except OSError as error:
-            raise RunError(
+            raise InUse(
                 f"{of or path.parent} is in use by process {_holder(descriptor)}.",
                 hint="Wait for it, stop it, or give the new run another name.",
             ) from error

@@ -7,7 +7,6 @@ PostgreSQL  an advisory lock, which the database drops with the connection, from
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,8 +17,8 @@ from typing import Final
 import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
 
-from racecraft import system
-from racecraft.errors import RunError
+from racecraft.errors import InUse, RunError
+from racecraft.run.lock import exclusive_lock
 from racecraft.serve.store.database import SQLITE, Database
 
 PATIENCE: Final = 30.0
@@ -71,15 +70,9 @@ def _wait(is_ours: Callable[[], bool], patience: float) -> None:
 
 def _locked(stack: ExitStack, path: Path) -> bool:
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise RunError(f"{path} cannot be opened: {error.strerror or error}.") from error
-    try:
-        system.lock(descriptor)
-    except OSError:
-        os.close(descriptor)
+        stack.enter_context(exclusive_lock(path))
+    except InUse:
         return False
-    stack.callback(os.close, descriptor)
     return True
 
 
