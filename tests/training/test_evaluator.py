@@ -24,6 +24,7 @@ from racecraft.training.regimes import OBJECTS
 from racecraft.training.settings import TrainSettings
 
 SETTINGS = TrainSettings(track="oval", until=Until(steps=1000), evaluation_trials=2, num_threads=1)
+AMONG_BOXES = replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=2)))
 Judge = Callable[..., EvaluationReport]
 
 
@@ -74,6 +75,27 @@ def test_more_completion_is_better_and_then_a_faster_lap(judge: Judge, judged: E
     assert judged.best_score == (1.0, -13.0)
 
 
+def test_among_objects_whole_laps_come_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = judge_of(among := evaluator_for(AMONG_BOXES), monkeypatch)
+    assert judge(0.8, 0.9).is_best
+    assert judge(12.0, 0.1).is_best  # a whole one, if the other crashed soon
+    assert not judge(0.99, 0.99).is_best
+    assert judge(14.0, 0.2).is_best  # then how far, whatever the lap took
+    assert not judge(11.0, 0.1).is_best
+    assert judge(13.0, 0.2).is_best
+    assert among.best_score == (0.5, 0.6, -13.0)
+
+
+def test_who_began_without_whole_laps_first_goes_on_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    among = evaluator_for(AMONG_BOXES)
+    among.load_state({"last": None, "best_score": [0.85, -1e6], "best_lap": None})
+    judge = judge_of(among, monkeypatch)
+    assert among.was_good
+    assert not judge(12.0, 0.6).is_best
+    assert judge(0.9, 0.85).is_best
+    assert among.best_score == (0.875, -1e6)
+
+
 def test_on_several_tracks_the_mean_of_the_laps_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     judge = judge_of(evaluator_for(SETTINGS, "oval", "bowtie"), monkeypatch)
     assert judge(13.0, 20.0).is_best
@@ -108,11 +130,16 @@ def test_it_was_good_once_every_lap_was_completed_and_stays_so(judge: Judge, jud
     assert judged.was_good
 
 
-def test_among_objects_enough_of_the_way_is_good() -> None:
-    among = evaluator_for(replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=2))))
-    for completion, is_good in ((OBJECTS.good - 0.01, False), (OBJECTS.good, True)):
-        among.best_score = (completion, -1e6)
+def test_among_objects_enough_of_the_way_is_good(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = judge_of(among := evaluator_for(AMONG_BOXES), monkeypatch)
+    for completion, is_good in ((OBJECTS.good - 0.01, False), (OBJECTS.good, True), (0.1, True)):
+        judge(completion, completion)
         assert among.was_good is is_good
+    judge(9.0, 0.0)  # the best by whole laps, which is not the one with most of the way
+    again = evaluator_for(AMONG_BOXES)
+    again.load_state(among.state())
+    assert again.was_good
+    assert again.best_score == (0.5, 0.5, -9.0)
 
 
 def objects_of(simulation: Simulation) -> list[list[float]]:

@@ -22,6 +22,7 @@ from racecraft.run.evolution import MAX_POSES, Drive, is_kept
 from racecraft.sim import CONTROL_DT, Simulation
 from racecraft.sim.camera import CAMERAS
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.objects import NO_OBJECTS
 from racecraft.track import Track
 from racecraft.training.progress import EvaluationReport
 from racecraft.training.regimes import regime_of
@@ -60,6 +61,9 @@ class Evaluator:
         """What the first car drove in the last evaluation or look, where `racecraft.run.evolution` keeps it."""
         self._looked_at = 0
         self.best_score: tuple[float, ...] | None = None
+        self.most_completion = 0.0
+        """Mean fraction of the lap, of the evaluation with most of it."""
+        self._counts_laps = settings.objects != NO_OBJECTS
         self.gained_at = 0
         """Camera steps of training behind the first evaluation that was as good as the best."""
         self.best_lap: float | None = None
@@ -75,21 +79,24 @@ class Evaluator:
         return self.last.step if self.last is not None else 0
 
     @property
-    def score(self) -> tuple[float, float] | None:
+    def score(self) -> tuple[float, ...] | None:
         """What makes a checkpoint the best, most important first: completion, then a fast lap.
 
-        On several tracks a lap of one says nothing of the others, so there it is the mean of all laps.
+        Among objects, whose places differ from lap to lap, the share of whole laps comes before both: where a lap ended
+        is luck, that it did is not. On several tracks a lap of one says nothing of the others, so there it is the mean
+        of all laps.
         """
         if self.last is None:
             return None
         laps = self.last.lap_times
         lap = float(np.mean(laps)) if self._is_of_many and laps else self.last.best_lap
-        return self.last.completion, -(lap or NO_LAP)
+        whole = (len(laps) / len(self.last.completions),) if self._counts_laps else ()
+        return (*whole, self.last.completion, -(lap or NO_LAP))
 
     @property
     def was_good(self) -> bool:
         """Whether some evaluation so far completed every lap; among objects, enough of the way."""
-        return self.best_score is not None and self.best_score[0] >= self._good
+        return self.most_completion >= self._good
 
     @property
     def has_settled(self) -> bool:
@@ -123,6 +130,7 @@ class Evaluator:
         if self.best_score is None or score >= self.best_score:
             self.best_score = score
             self.last = replace(self.last, is_best=True)
+        self.most_completion = max(self.most_completion, self.last.completion)
         self.best_lap = min((lap for lap in (self.best_lap, *lap_times) if lap is not None), default=None)
         return self._episodes(outcome, counter)
 
@@ -184,7 +192,13 @@ class Evaluator:
     def state(self) -> dict[str, Any]:
         """What a resumed run needs, as JSON."""
         last = None if self.last is None else asdict(self.last)
-        return {"last": last, "best_score": self.best_score, "best_lap": self.best_lap, "gained_at": self.gained_at}
+        return {
+            "last": last,
+            "best_score": self.best_score,
+            "most_completion": self.most_completion,
+            "best_lap": self.best_lap,
+            "gained_at": self.gained_at,
+        }
 
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Continue from what `state` gave; KeyError or TypeError where it is not that."""
@@ -193,7 +207,11 @@ class Evaluator:
             self.last = EvaluationReport.from_dict(last)
         self.best_score = None if score is None else tuple(map(float, score))
         self.best_lap = None if lap is None else float(lap)
-        self.gained_at = int(state.get("gained_at", 0))  # runs of earlier versions have none
+        # Runs of earlier versions have less, and go on by the score that they began with.
+        self.gained_at = int(state.get("gained_at", 0))
+        begun = self.best_score[0] if self.best_score is not None else 0.0
+        self.most_completion = float(state.get("most_completion", begun))
+        self._counts_laps &= self.best_score is None or len(self.best_score) == 3
 
 
 def _lap_of(step: int, rows: NDArray[np.float64], outcome: Completion) -> Drive:

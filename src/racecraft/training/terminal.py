@@ -229,8 +229,9 @@ class TerminalReporter:
         return table
 
 
-def _rank(report: EvaluationReport) -> tuple[float, float]:
-    return report.completion, -(report.best_lap or 1e6)
+def _rank(report: EvaluationReport) -> tuple[bool, int]:
+    """The best of the run; of a stretch that has none of its own, the latest."""
+    return report.is_best, report.step
 
 
 def _laps(report: EvaluationReport) -> str:
