@@ -348,6 +348,23 @@ def test_a_worker_reads_and_writes_what_its_job_names_and_nothing_else(place: Pl
     place.console.client.post(f"/api/jobs/{job}/cancel")
 
 
+def test_a_result_that_could_not_be_read_again_is_refused(place: Place) -> None:
+    """NaN once took the list of models away on SQLite, a zero character on PostgreSQL, half a letter that of jobs."""
+    name = place.console.create(name="odd", train=False, track="oval", seed=5, until="512 steps")
+    job = ok(place.console.client.post(f"/api/models/{name}/train", json={}), 202)["id"]
+    hand = place.hand(place.token()[1])
+    place.console.wait_for(lambda: ok(hand.take()))
+    for told in ("NaN", "[-Infinity]", "1e999", '"\\u0000"', '"\\ud800"', '{"\\udfff": 1}', 500 * "[" + 500 * "]"):
+        body = f'{{"job": "{job}", "state": "done", "result": {{"x": {told}}}}}'
+        reply = hand.client.post(
+            f"/api/workers/{hand.name}/finish", content=body, headers={"content-type": "application/json"}
+        )
+        assert "cannot be kept" in refused(reply, 422), told
+    ok(hand.post("finish", job=job, state="done", result={"x": "whole"}), 204)
+    for path in ("/api/jobs", f"/api/jobs/{job}", "/api/models", f"/api/models/{name}"):
+        ok(place.console.client.get(path))
+
+
 def test_small_files_travel_together_and_nowhere_else_than_alone(place: Place) -> None:
     for name in ("packed", "other"):
         place.console.create(name=name, train=False, track="oval", seed=5, until="512 steps")

@@ -24,6 +24,7 @@ from sqlalchemy.orm import aliased
 
 from racecraft.serve.jobs.cargo import Cargo
 from racecraft.serve.jobs.office import Answer, Slot
+from racecraft.serve.jobs.outcome import check_outcome
 from racecraft.serve.jobs.turns import choose_to_rest, is_full, running_on, turn_of, turn_order, waiting_line
 from racecraft.serve.settings import OWNER
 from racecraft.serve.store.database import Database
@@ -396,7 +397,13 @@ class JobQueue:
         result: Mapping[str, Any] | None = None,
         error: Mapping[str, Any] | None = None,
     ) -> bool:
-        """End a job that this owner holds; False when it is another's now."""
+        """End a job that this owner holds; False when it is another's now.
+
+        Raises:
+            RunError: What came of it cannot be kept.
+        """
+        for told in (result, error):
+            check_outcome(told)
         ended = sa.update(Job).where(Job.id == job_id, Job.owner == owner, Job.state == "running")
         with self._database.transaction() as session:
             moment, job = self._database.moment(session), session.get(Job, job_id)

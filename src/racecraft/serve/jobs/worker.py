@@ -16,11 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.errors import RacecraftError, RunError
+from racecraft.errors import RacecraftError, RunError, printable_lines
 from racecraft.moved import move
 from racecraft.serve.jobs.access import Access
 from racecraft.serve.jobs.courier import Courier
 from racecraft.serve.jobs.office import AWAY, Answer, Office
+from racecraft.serve.jobs.outcome import check_outcome
 from racecraft.serve.jobs.queue import KINDS, LEASE, function_named
 from racecraft.serve.jobs.task import Task
 from racecraft.serve.settings import OWNER, runs_of
@@ -118,6 +119,7 @@ class Worker:
             result = work(self._task)
             if self._courier is not None:
                 self._courier.deliver()
+            check_outcome(result)
         except Exception as error:
             described = _described(error)
             self._report(lambda: self._finish("failed", error=described))
@@ -195,8 +197,8 @@ def _described(error: Exception) -> dict[str, Any]:
         traceback.print_exception(error)
     return {
         "code": type(error).__name__,
-        "message": str(error),
-        "hint": getattr(error, "hint", "") if is_expected else "This is a bug in Racecraft.",
+        "message": printable_lines(str(error)),  # a file's name may hold what no database keeps
+        "hint": printable_lines(getattr(error, "hint", "")) if is_expected else "This is a bug in Racecraft.",
         "line": getattr(error, "line", None),
     }
 

@@ -276,11 +276,12 @@ class Garage:
 
     def _latest_trainings(self, session: Session, only: list[str] | None) -> dict[str, tuple[str, str]]:
         """State and reason of the end of each run's newest training."""
-        query = sa.select(Job.run, Job.state, Job.result["reason"].as_string())
+        query = sa.select(Job.run, Job.state, Job.result)  # whole: a database fails at all for one that holds NaN
         query = query.where(Job.kind == "train", Job.user_id == self._user_id)
         if only is not None:
             query = query.where(Job.run.in_(only))
-        return {run: (state, reason or "") for run, state, reason in session.execute(query.order_by(Job.created))}
+        rows = session.execute(query.order_by(Job.created))
+        return {run: (state, str((result or {}).get("reason") or "")) for run, state, result in rows}
 
     @contextmanager
     def _free(self, folder: RunFolder) -> Iterator[None]:
