@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from PIL import Image
 from racecraft.errors import TrackError
 from racecraft.track import TrackPicture, draw_contact_sheet, draw_track, generate_track, load_track, track_names
 from racecraft.track.canvas import Canvas, text_width
-from racecraft.track.road_art import ROAD
+from racecraft.track.road_art import ROAD, Ribbon
 
 
 def test_a_picture_is_written(tmp_path: Path) -> None:
@@ -115,3 +116,19 @@ def test_wrong_sizes(tmp_path: Path, width_px: int) -> None:
         draw_contact_sheet([load_track("oval")], tmp_path / "track.png", width_px=width_px)
     with pytest.raises(TrackError, match="at least one"):
         draw_contact_sheet([], tmp_path / "track.png")
+
+
+def test_places_of_numbers_are_looked_for_among_the_nearest_borders_and_are_apart_from_all() -> None:
+    track = load_track("reinvent_2018")
+    picture = TrackPicture(track, width_px=400, has_numbers=False)
+    picture._area = (-math.inf, -math.inf, math.inf, math.inf)
+    x_min, y_min, x_max, y_max = track.bounds
+    places = np.random.default_rng(1).uniform((x_min - 0.5, y_min - 0.5), (x_max + 0.5, y_max + 0.5), (400, 2))
+    s, offset = track.project(places)
+    near = 0.4 * float(track.mean_width)
+    borders = np.concatenate((Ribbon(track).left, Ribbon(track).right))
+    apart = np.hypot(*(places[:, None] - borders).T).min(axis=0) >= 0.9 * near
+    is_free = apart & (np.abs(offset) > track.width_at(s) / 2)
+    found = [picture._is_free(place, near) for place in places]
+    assert 100 < sum(found) < 350
+    assert found == is_free.tolist()

@@ -43,6 +43,7 @@ RULE = (205, 200, 188)  # colour of the hairline above the figures
 MIN_WIDTH_PX, MAX_WIDTH_PX = 320, 6000
 SCALE_BARS = (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # metres
 SMALL_ROAD = 9.0  # hundredths of a cell; on narrower roads the chevrons at the start cannot be read
+SLIDES = np.array((0.0, 0.12, -0.12, 0.24, -0.24, 0.36, -0.36, 0.48, -0.48))  # of a number from apex, lengths of corner
 SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -80,6 +81,8 @@ class TrackPicture:
             area[3] + foot - 10.6 * unit,
         )  # for the numbers
         self._ribbon = Ribbon(track)
+        borders = np.concatenate((self._ribbon.left, self._ribbon.right))
+        self._borders = borders[borders[:, 0].argsort()]  # from left to right, as a long road has very many
         self.canvas.dots(1.0, GRID, radius_px=max(0.5, 0.09 * unit))
         paint_infield(self.canvas, self._ribbon)
         paint_road(self.canvas, track, self._ribbon, self.corners, shadow_px=0.75 * unit)
@@ -159,10 +162,9 @@ class TrackPicture:
     def _free_place(self, corner: TrackCorner, reach: float, taken: list[Floats]) -> Floats | None:
         """A place for a disc of radius `reach`, metres, off the road and apart from the others."""
         outside = 1.0 if corner.turn > 0 else -1.0
+        slides = corner.apex + SLIDES * (corner.end - corner.start)
         for side, out in ((outside, 1.0), (-outside, 1.0), (outside, 1.6), (-outside, 1.6)):
-            for slide in (0.0, 0.12, -0.12, 0.24, -0.24, 0.36, -0.36, 0.48, -0.48):
-                s = corner.apex + slide * (corner.end - corner.start)
-                place = self._ribbon.beside(s, side, out * reach + (KERB_WIDTH if side != outside else 0.0))
+            for place in self._ribbon.beside(slides, side, out * reach + (KERB_WIDTH if side != outside else 0.0)):
                 if self._is_free(place, reach) and all(np.hypot(*(place - other)) > 1.7 * reach for other in taken):
                     return place
         return None
@@ -173,8 +175,9 @@ class TrackPicture:
         x_min, y_min, x_max, y_max = self._area
         if not (x_min + margin < x < x_max - margin and y_min + margin < y < y_max - margin):
             return False
-        borders = np.concatenate((self._ribbon.left, self._ribbon.right))
-        if float(np.hypot(*(borders - place).T).min()) < 0.9 * reach:
+        near = 0.9 * reach
+        begin, end = np.searchsorted(self._borders[:, 0], (place[0] - near, place[0] + near))
+        if (np.hypot(*(self._borders[begin:end] - place).T) < near).any():
             return False
         s, offset = self.track.project(place)
         return abs(float(offset)) > float(self.track.width_at(s)) / 2

@@ -43,11 +43,12 @@ class Ribbon:
         self.left, self.centre, self.right = smooth[:, :2], smooth[:, 2:4], smooth[:, 4:]
         waypoint = np.linspace(0.0, len(track.centerline) - 1.0, len(smooth))
         self._arc = np.interp(waypoint, np.arange(len(track.centerline)), track.arc_length)
+        self._centre = self._along(self._arc, self.centre)
         self._borders = {side: self._border(track, side) for side in (-1.0, 1.0)}
 
     def place(self, s: ArrayLike) -> Floats:
         """Places on the centre line, metres. Shape (...,) to (..., 2)."""
-        return self._at(s, self._arc, self.centre)
+        return self._at(s, self._centre)
 
     def leftwards(self, s: float) -> Floats:
         """Unit vector square to the centre line, to its left, (2,)."""
@@ -56,8 +57,8 @@ class Ribbon:
 
     def beside(self, s: ArrayLike, side: float, out: float) -> Floats:
         """Places `out` metres outside a border; negative is on the road. Shape (...,) to (..., 2)."""
-        arc, border, normal = self._borders[side]
-        return np.asarray(self._at(s, arc, border) + out * self._at(s, arc, normal))
+        at = self._at(s, self._borders[side])
+        return np.asarray(at[..., :2] + out * at[..., 2:])
 
     def strip(self, s: Floats, side: float, out: tuple[float, float]) -> Floats:
         """Outlines of strips between two distances outside a border, metres: (..., 2 P, 2) for `s` (..., P)."""
@@ -66,7 +67,7 @@ class Ribbon:
 
     def edge_line(self, side: float, out: tuple[float, float]) -> Floats:
         """Quadrilaterals of a strip along a whole border, metres, (P - 1, 4, 2)."""
-        _, border, normal = self._borders[side]
+        border, normal = self._side(side)
         near, far = (border + distance * normal for distance in out)
         return np.stack((near[:-1], near[1:], far[1:], far[:-1]), axis=1)
 
@@ -74,27 +75,38 @@ class Ribbon:
         """The surface as one polygon, metres, (P, 2); of a closed road, the ring is cut open at the start."""
         return np.concatenate((self.left, self.right[::-1]))
 
-    def _border(self, track: Track, side: float) -> tuple[Floats, Floats, Floats]:
-        """Arc length (P,), places (P, 2) and outward normals (P, 2) of a border.
+    def _side(self, side: float) -> tuple[Floats, Floats]:
+        """Places (P, 2) and outward normals (P, 2) of a border."""
+        border = self.right if side > 0 else self.left
+        return border, side * _right_of(border, is_closed=self.is_closed)
+
+    def _border(self, track: Track, side: float) -> tuple[Floats, Floats]:
+        """A border's places and outward normals over the distance along the road.
 
         Rows of foreign routes need not be square to the road, so each place's distance along it is that of
         its projection.
         """
-        border = self.right if side > 0 else self.left
+        border, normal = self._side(side)
         shift = track.project(border)[0] - self._arc
         if self.is_closed:
             shift = (shift + self.length / 2) % self.length - self.length / 2
         # strictly rising, also where a tight border folds back
         arc = np.maximum.accumulate(self._arc + shift) + 1e-9 * np.arange(len(shift))
-        return arc, border, side * _right_of(border, is_closed=self.is_closed)
+        return self._along(arc, np.concatenate((border, normal), axis=1))
 
-    def _at(self, s: ArrayLike, arc: Floats, line: Floats) -> Floats:
-        s = np.asarray(s, dtype=np.float64)
+    def _along(self, arc: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """Distances along the road, metres (Q,), and each of the values (P, K) there, (K, Q), for `_at`."""
         if self.is_closed:  # a lap before and after, so that nothing happens at the start line
-            s = s % self.length
             arc = np.maximum.accumulate((np.array([[-1.0], [0.0], [1.0]]) * self.length + arc[:-1]).ravel())
-            line = np.concatenate((line[:-1],) * 3)
-        return np.stack([np.interp(s, arc, line[:, axis]) for axis in (0, 1)], axis=-1)
+            values = np.concatenate((values[:-1],) * 3)
+        return arc, np.ascontiguousarray(values.T)
+
+    def _at(self, s: ArrayLike, along: tuple[Floats, Floats]) -> Floats:
+        """The values (..., K) at distances along the road (...)."""
+        s = np.asarray(s, dtype=np.float64)
+        arc, values = along
+        s = s % self.length if self.is_closed else s
+        return np.stack([np.interp(s, arc, column) for column in values], axis=-1)
 
 
 def paint_infield(canvas: Canvas, ribbon: Ribbon) -> None:
