@@ -12,6 +12,7 @@ import pytest
 from racecraft.errors import ConfigError
 from racecraft.importing import drfc as settings_of_drfc
 from racecraft.importing import import_run
+from racecraft.importing.env_file import parse_env
 from racecraft.run import RunFolder
 from racecraft.sim import Bots, Objects, Obstacles, load_randomization
 from racecraft.training.start import read_settings
@@ -166,6 +167,24 @@ def test_the_page_names_every_setting_that_is_known() -> None:
         known |= settings_of_drfc.OBJECTS.keys()
         known |= {*settings_of_drfc.ALIASES, settings_of_drfc.MODEL_PREFIX, settings_of_drfc.PRETRAINED}
         assert name in known or settings_of_drfc.meaning(concrete) is not None, name
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "DR_RACER_NAME",
+        "DR_EVAL_DEBUG_REWARD",
+        "DR_EVAL_OPP_RACER_NAME",
+        "DR_EVAL_RTF",
+        "DR_ENABLE_EXTRA_KVS_OVERLAY",
+        "DR_LOCAL_SECRET_ACCESS_KEY",
+        "DR_MINIO_URL",
+        "DR_GAZEBO_ARGS",
+    ],
+)
+def test_what_its_templates_and_scripts_know_is_not_unknown(name: str) -> None:
+    found = settings_of_drfc.read_drfc(parse_env(f"{name}=1\n", name="run.env"), name="run.env")
+    assert (list(found.without_effect), found.unknown) == ([name], {})
 
 
 def test_a_trial_that_is_not_continuous_forgives_nothing(tmp_path: Path) -> None:

@@ -57,6 +57,7 @@ PRETRAINED_CHECKPOINT: Final = "DR_LOCAL_S3_PRETRAINED_CHECKPOINT"
 
 ALIASES: Final = {
     "DR_CHANGE_START_POSITION": "DR_TRAIN_CHANGE_START_POSITION",
+    "DR_ALTERNATE_DRIVING_DIRECTION": "DR_TRAIN_ALTERNATE_DRIVING_DIRECTION",
     "DR_TRAIN_ROUND_ROBIN_ADVANCE_DISTANCE": "DR_TRAIN_ROUND_ROBIN_ADVANCE_DIST",
     "DR_EVAL_NUMBER_OF_RESETS": "DR_EVAL_MAX_RESETS",
     "DR_COLLISION_PENALTY": "DR_EVAL_COLLISION_PENALTY",
@@ -85,8 +86,10 @@ OBJECTS: Final = {
 NO_EFFECT: Final = {
     "DR_CAR_*": "looks and names do not change the driving",
     "DR_DISPLAY_NAME": "looks and names do not change the driving",
+    "DR_RACER_NAME": "looks and names do not change the driving",
     "DR_EVAL_CHECKPOINT": "say it with racecraft evaluate --checkpoint last; best is the default",
     "DR_EVAL_SAVE_MP4": "racecraft evaluate films by itself",
+    "DR_EVAL_DEBUG_REWARD": "an evaluation sums AWS's default reward",
     "DR_EVAL_RESET_BEHIND_DIST": "there is nothing on the track to be put behind",
     "DR_EVAL_OPP_*": "there are no opponents in an evaluation",
     "DR_*_RTF": "the simulator runs as fast as it can",
@@ -97,6 +100,8 @@ NO_EFFECT: Final = {
     "DR_RUN_ID": "runs do not share a machine's ports",
     "DR_EXPERIMENT_NAME": "import the experiment's own folder",
     "DR_LOCAL_S3_*": "there is no S3 here",
+    "DR_LOCAL_ACCESS_KEY_ID": "there is no S3 here",
+    "DR_LOCAL_SECRET_ACCESS_KEY": "there is no S3 here",
     "DR_UPLOAD_*": "nothing is uploaded",
     "DR_REMOTE_*": "there is no S3 here",
     "DR_CLOUD*": "there is no cloud here",
@@ -104,6 +109,8 @@ NO_EFFECT: Final = {
     "DR_KINESIS_*": "there is no cloud here",
     "DR_TELEGRAF_*": "metrics go into the run folder",
     "DR_CAMERA_*": "racecraft evaluate films by itself",
+    "DR_ENABLE_EXTRA_KVS_OVERLAY": "racecraft evaluate films by itself",
+    "DR_GAZEBO_ARGS": "there is no Gazebo here",
     "DR_GUI_ENABLE": "there is no Gazebo here",
     "DR_WEBVIEWER_PORT": "there is no Gazebo here",
     "DR_ROBOMAKER_*": "there are no containers here",
