@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from racecraft.sim import Simulation
 from racecraft.sim.objects import OBJECT_KINDS
+from racecraft.training.nearest import nearest_along
 
 NEARBY_COLUMNS: Final = (
     "nearby_closeness",  # of the nearest along the road: e to the power of minus how many `REACH` lie between middles
@@ -51,16 +52,18 @@ class NearbyTeller:
         """`NEARBY_COLUMNS` of every car at the last judged step; zeros where nobody is left  (N, 4)."""
         column, of_objects = self._simulation.column, self._simulation.object_column
         road, length = column("track_index").astype(np.intp), column("track_length")[:, None]
-        ahead = of_objects("object_distance") - column("projection_distance")[:, None]  # m: car, object
-        nearer = (ahead + 0.5 * length) % length - 0.5 * length  # the shorter way round
-        ahead = np.where(self._is_closed[road][:, None], nearer, ahead)
         is_there = of_objects("object_kind") != _GONE
-        nearest = np.where(is_there, np.abs(ahead), np.inf).argmin(axis=1)[:, None]
+        nearest, away = nearest_along(
+            of_objects("object_distance") - column("projection_distance")[:, None],
+            length=length,
+            is_closed=self._is_closed[road][:, None],
+            is_there=is_there,
+        )
+        gap = away[:, 0]
 
         def of_nearest(values: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.take_along_axis(values, nearest, axis=1)[:, 0]
 
-        gap = of_nearest(ahead)
         closeness = np.exp(-np.abs(gap) / REACH)
         left = (of_nearest(of_objects("object_offset")) - column("offset")) / (0.5 * column("track_width"))
         direction = self._directions[road, (of_nearest(of_objects("object_distance")) / SPACING).astype(np.intp)]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.sim import Simulation
+from racecraft.training.nearest import nearest_along
 
 RIVAL_COLUMNS: Final = (
     "rival_closeness",  # of the nearest other car along the road: 1 / (1 + m between them)
@@ -30,17 +31,16 @@ def tell_rivals(simulation: Simulation) -> NDArray[np.float32]:
         simulation.column(name).reshape(-1, size)
         for name in ("projection_distance", "track_length", "offset", "actual_speed", "track_width")
     )
-    ahead = place[:, None, :] - place[:, :, None]  # m: race, car, other car
-    length = length[:, :, None]
     is_closed = np.array([track.is_closed for track in simulation.tracks])
     index = simulation.column("track_index").reshape(-1, size, 1).astype(np.intp) % len(is_closed)
-    nearer = (ahead + 0.5 * length) % length - 0.5 * length  # the shorter way round
-    ahead = np.where(is_closed[index], nearer, ahead)
-    apart = np.abs(ahead)
-    apart[:, np.arange(size), np.arange(size)] = np.inf
-    nearest = apart.argmin(axis=2)
+    nearest, away = nearest_along(
+        place[:, None, :] - place[:, :, None],  # m: race, car, other car
+        length=length[:, :, None],
+        is_closed=is_closed[index],
+        is_there=~np.eye(size, dtype=bool)[None],
+    )
+    nearest, gap = nearest[:, :, 0], away[:, :, 0]
 
-    gap = np.take_along_axis(ahead, nearest[:, :, None], axis=2)[:, :, 0]
     left, faster = (np.take_along_axis(values, nearest, axis=1) - values for values in (offset, speed))
     columns = (1.0 / (1.0 + np.abs(gap)), np.tanh(gap / PLACE), left / (0.5 * width), faster / 4.0)
     return np.stack(columns, axis=-1).reshape(-1, len(columns)).astype(np.float32)
