@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import httpx
 import pytest
 import sqlalchemy as sa
 from leagues import running_league
@@ -45,6 +48,30 @@ def test_a_second_server_of_a_league_is_refused_until_the_first_is_gone(
         league.console.kill()
         with sole_server(settings.database_url, on_loss=pytest.fail, patience=SOON):
             pass
+
+
+@pytest.mark.parametrize("moment", ["before it listens", "while it serves"])
+def test_a_server_that_lost_its_place_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
+    told: list[Callable[[], None]] = []
+
+    @contextmanager
+    def place(url: str, on_loss: Callable[[], None]) -> Iterator[None]:
+        if moment == "before it listens":
+            on_loss()
+        told.append(on_loss)
+        yield
+
+    monkeypatch.setattr(server, "sole_server", place)
+    links: queue.Queue[str] = queue.Queue()
+    settings = ServeSettings(runs=tmp_path / "runs", port=0, league=True)
+    serving = threading.Thread(target=server.serve, args=(settings,), kwargs={"on_ready": links.put}, daemon=True)
+    serving.start()
+    link = links.get(timeout=SOON)
+    if moment == "while it serves":
+        assert httpx.get(f"{link.partition('/?')[0]}/api/health", timeout=SOON).status_code == 204
+        told[0]()
+    serving.join(SOON)
+    assert not serving.is_alive(), "it would count beside the other"
 
 
 def test_who_starts_while_the_one_before_stops_waits_for_it(tmp_path: Path) -> None:

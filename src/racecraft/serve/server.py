@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import ssl
+import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
@@ -46,14 +47,9 @@ def serve(settings: ServeSettings, *, on_ready: Callable[[str], None]) -> None:
             f"Port {settings.port} of {settings.host} cannot be used: {error.strerror}.",
             hint="Choose another with --port.",
         ) from error
-    servers: list[_Server] = []
-
-    def end() -> None:
-        for server in servers:
-            server.end()
-
-    with listener, _alone(settings, on_loss=end):
-        _serve(settings, listener, encryption, servers, on_ready)
+    is_lost = threading.Event()
+    with listener, _alone(settings, on_loss=is_lost.set):
+        _serve(settings, listener, encryption, is_lost, on_ready)
 
 
 def _alone(settings: ServeSettings, on_loss: Callable[[], None]) -> AbstractContextManager[None]:
@@ -65,7 +61,7 @@ def _serve(
     settings: ServeSettings,
     listener: socket.socket,
     encryption: dict[str, Any],
-    servers: list[_Server],
+    is_lost: threading.Event,
     on_ready: Callable[[str], None],
 ) -> None:
     port = listener.getsockname()[1]
@@ -85,20 +81,22 @@ def _serve(
     at = settings.address.rstrip("/") if settings.certificate else f"http://{ADDRESS}:{port}"
     on_ready(f"{at}/?ticket={app.state.guard.ticket()}")
     with read_by(Aside()):
-        servers.append(_Server(config, on_stop=app.state.context.supervisor.news.end))
-        servers[0].run(sockets=[listener])
+        _Server(config, is_lost, on_stop=app.state.context.supervisor.news.end).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
-    """Says that it stops before it waits for open requests, among them those that wait for news themselves."""
+    """Stops when the league is another server's, and says so before it waits for open requests.
 
-    def __init__(self, config: uvicorn.Config, *, on_stop: Callable[[], None]) -> None:
+    Among these are some that wait for news themselves.
+    """
+
+    def __init__(self, config: uvicorn.Config, is_lost: threading.Event, *, on_stop: Callable[[], None]) -> None:
         super().__init__(config)
-        self._on_stop = on_stop
+        self._is_lost, self._on_stop = is_lost, on_stop
 
-    def end(self) -> None:
-        """Stop soon; from any thread."""
-        self.should_exit = True
+    async def on_tick(self, counter: int) -> bool:
+        """Whether to stop; asked ten times a second."""
+        return await super().on_tick(counter) or self._is_lost.is_set()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop."""
