@@ -162,6 +162,7 @@ class TrackPicture:
     def _free_place(self, corner: TrackCorner, reach: float, taken: list[Floats]) -> Floats | None:
         """A place for a disc of radius `reach`, metres, off the road and apart from the others."""
         outside = 1.0 if corner.turn > 0 else -1.0
+        place: Floats
         slides = corner.apex + SLIDES * (corner.end - corner.start)
         for side, out in ((outside, 1.0), (-outside, 1.0), (outside, 1.6), (-outside, 1.6)):
             for place in self._ribbon.beside(slides, side, out * reach + (KERB_WIDTH if side != outside else 0.0)):
