@@ -17,7 +17,7 @@ from racecraft.errors import RunError, typed
 from racecraft.json_file import read_json_object
 from racecraft.limits import known_limit
 from racecraft.race.recording import Recording
-from racecraft.replay.replay import Replay, read_replay
+from racecraft.replay.replay import MAX_CELLS, Replay, read_replay
 from racecraft.run import RunFolder, read_stretches, stretch_at
 from racecraft.run.atomic import write_file
 from racecraft.track.picture import describe
@@ -53,13 +53,19 @@ def write_share(run: str | Path, path: str | Path | None = None, *, stamp: str =
     return target
 
 
-def share(folder: RunFolder, stamp: str, *, language: str = "en") -> str:
+def share(folder: RunFolder, stamp: str, *, language: str = "en", max_numbers: int = MAX_CELLS) -> str:
     """The best lap of an evaluation as one HTML text; without a whole lap, the drive that came furthest.
+
+    Args:
+        folder: The run.
+        stamp: Of the evaluation.
+        language: ``en`` or ``de``.
+        max_numbers: As for `read_replay`.
 
     Raises:
         RacecraftError: There is no such evaluation, or its files cannot be read.
     """
-    replay, lap = _driven(folder, stamp)
+    replay, lap = _driven(folder, stamp, max_numbers)
     words = words_of(language)
     track, step = lap.track, _step(folder, stamp)
     title, _ = describe(track)
@@ -83,13 +89,15 @@ def share(folder: RunFolder, stamp: str, *, language: str = "en") -> str:
     )
 
 
-def draw_share(folder: RunFolder, stamp: str, path: Path, *, language: str = "en") -> Path:
-    """The same lap as a picture: racing line, time, medal and reward, with the replay file inside.
+def draw_share(
+    folder: RunFolder, stamp: str, path: Path, *, language: str = "en", max_numbers: int = MAX_CELLS
+) -> Path:
+    """The same lap as a picture: racing line, time, medal and reward, with the replay file inside; else as `share`.
 
     Raises:
         RacecraftError: There is no such evaluation, or the picture cannot be written.
     """
-    replay, lap = _driven(folder, stamp)
+    replay, lap = _driven(folder, stamp, max_numbers)
     words = words_of(language)
     title, _ = describe(lap.track)
     figures = [(what.upper(), value) for what, value in _figures(replay, lap, words)]
@@ -98,11 +106,11 @@ def draw_share(folder: RunFolder, stamp: str, path: Path, *, language: str = "en
     return finish_picture(path, words["reward"], reward, replay=_file(folder, stamp))
 
 
-def _driven(folder: RunFolder, stamp: str) -> tuple[Replay, Recording]:
+def _driven(folder: RunFolder, stamp: str, max_numbers: int) -> tuple[Replay, Recording]:
     path = folder.evaluation_replay(stamp)
     if not (stamp.isascii() and stamp.isdigit()) or not path.is_file():
         raise RunError(f"{folder.name} has no evaluation {stamp[:40]!r} with a replay.", hint="Evaluate it once more.")
-    replay = read_replay(path)
+    replay = read_replay(path, max_numbers=max_numbers)
     whole = [
         (seconds, index, number)
         for index, car in enumerate(replay.cars)

@@ -14,7 +14,7 @@ from racecraft.analysis.report_page import page, section
 from racecraft.analysis.share_page import LANGUAGES, Shown, line_of, number, proof, script, stage, words_of
 from racecraft.analysis.share_picture import draw_line, finish_picture
 from racecraft.race.recording import Recording
-from racecraft.replay.replay import read_replay
+from racecraft.replay.replay import MAX_CELLS, read_replay
 from racecraft.track.picture import describe
 from racecraft.version import VERSION
 
@@ -36,7 +36,9 @@ class Placed:
     """Behind the winner, s."""
 
 
-def share_heat(file: Path, rows: Sequence[Placed], *, title: str, language: str = "en") -> str:
+def share_heat(
+    file: Path, rows: Sequence[Placed], *, title: str, language: str = "en", max_numbers: int = MAX_CELLS
+) -> str:
     """A heat as one HTML text.
 
     Args:
@@ -44,11 +46,12 @@ def share_heat(file: Path, rows: Sequence[Placed], *, title: str, language: str 
         rows: The result, the winner first.
         title: What the heat is called.
         language: ``en`` or ``de``.
+        max_numbers: As for `read_replay`.
 
     Raises:
         ReplayError: The file cannot be read.
     """
-    words, drives = words_of(language), _drives(file, rows)
+    words, drives = words_of(language), _drives(file, rows, max_numbers)
     road, _ = describe(drives[0].track)
     cars = [Shown(row.name, drive) for row, drive in zip(rows, drives, strict=True)]
     winner = rows[0]
@@ -67,21 +70,29 @@ def share_heat(file: Path, rows: Sequence[Placed], *, title: str, language: str 
     )
 
 
-def draw_heat(file: Path, rows: Sequence[Placed], path: Path, *, title: str, language: str = "en") -> Path:
-    """The winner's racing line and the result as a picture, with the replay file inside.
+def draw_heat(
+    file: Path,
+    rows: Sequence[Placed],
+    path: Path,
+    *,
+    title: str,
+    language: str = "en",
+    max_numbers: int = MAX_CELLS,
+) -> Path:
+    """The winner's racing line and the result as a picture, with the replay file inside; otherwise as `share_heat`.
 
     Raises:
         RacecraftError: The file cannot be read, or the picture not written.
     """
-    words, drives = words_of(language), _drives(file, rows)
+    words, drives = words_of(language), _drives(file, rows, max_numbers)
     figures = [(what.upper(), value) for what, value in _figures(rows[0], words)]
     road, _ = describe(drives[0].track)
     draw_line(drives[0], path, title=title, subtitle=road, figures=figures, words=words)
     return finish_picture(path, words["heat"], "\n".join(_lines(rows, words)), replay=file.read_bytes())
 
 
-def _drives(file: Path, rows: Sequence[Placed]) -> list[Recording]:
-    cars = read_replay(file).cars
+def _drives(file: Path, rows: Sequence[Placed], max_numbers: int) -> list[Recording]:
+    cars = read_replay(file, max_numbers=max_numbers).cars
     return [cars[row.car].recording for row in rows]
 
 

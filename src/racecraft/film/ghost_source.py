@@ -21,7 +21,7 @@ from racecraft.race.evaluation import evaluate
 from racecraft.race.placement import driven_track
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RaceRules
-from racecraft.replay.replay import read_replay
+from racecraft.replay.replay import MAX_CELLS, read_replay
 from racecraft.track.canvas import Color
 from racecraft.track.track import Track
 
@@ -65,8 +65,10 @@ def load_ghosts(
     return found
 
 
-def check_sources(sources: Sequence[str], track: Track, rules: RaceRules, *, run: Path | None) -> None:
-    """Refuse before a race what `load_ghosts` would refuse after it.
+def check_sources(
+    sources: Sequence[str], track: Track, rules: RaceRules, *, run: Path | None, max_numbers: int = MAX_CELLS
+) -> None:
+    """Refuse before a race what `load_ghosts` would refuse after it, and replays of more than `max_numbers` numbers.
 
     Raises:
         ConfigError: A source means nothing here, or a replay is of another road.
@@ -77,7 +79,7 @@ def check_sources(sources: Sequence[str], track: Track, rules: RaceRules, *, run
         if source == BEST_LAP:
             continue
         if Path(source).is_file():
-            _from_replay(Path(source), track, rules, LIVERY[0])
+            _from_replay(Path(source), track, rules, LIVERY[0], max_numbers)
         else:
             load_entry(_model(source, run))
 
@@ -87,8 +89,8 @@ def _check_number(sources: Sequence[str]) -> None:
         raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")
 
 
-def _from_replay(path: Path, track: Track, rules: RaceRules, color: Color) -> Ghost:
-    replay = read_replay(path)
+def _from_replay(path: Path, track: Track, rules: RaceRules, color: Color, max_numbers: int = MAX_CELLS) -> Ghost:
+    replay = read_replay(path, max_numbers=max_numbers)
     best = replay.evaluation.best_trial
     driver = replay.names[best.index]
     name = driver if replay.race else replay.title or driver  # of an evaluation only its title says who drove

@@ -94,12 +94,13 @@ def most_in(file_bytes: int) -> int:
     return min(MAX_BODY_BYTES, DENSE_BYTES + MAX_DENSITY * file_bytes)
 
 
-def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
+def unpack(data: bytes, *, name: str, max_bytes: int = MAX_BODY_BYTES) -> tuple[dict[str, Any], memoryview]:
     """Header and the bytes of all columns.
 
     Args:
         data: Of the file, whole.
         name: What messages call it.
+        max_bytes: That its body may have.
 
     Raises:
         ReplayError: Says what is wrong with the file.
@@ -112,7 +113,7 @@ def unpack(data: bytes, *, name: str) -> tuple[dict[str, Any], memoryview]:
             f"{name} is a replay of version {version}; this Racecraft reads up to {VERSION}.",
             hint="Update Racecraft." if version > VERSION else "",
         )
-    if not 4 <= size <= (most := most_in(len(data))):
+    if not 4 <= size <= (most := min(max_bytes, most_in(len(data)))):
         raise ReplayError(f"{name} says it holds {size:,} bytes; allowed are 4 to {most:,} in a file of its size.")
     inflater = zlib.decompressobj()
     try:

@@ -22,7 +22,7 @@ from racecraft.race.conditions import Conditions
 from racecraft.race.placement import driven_track
 from racecraft.race.recording import Recording
 from racecraft.race.results import Evaluation, Trial
-from racecraft.replay.codec import MAX_FILE_BYTES, TYPES, pack, pack_column, unpack, unpack_column
+from racecraft.replay.codec import MAX_BODY_BYTES, MAX_FILE_BYTES, TYPES, pack, pack_column, unpack, unpack_column
 from racecraft.replay.header import CarHeader, Header, check_header, conditions_of, header_of, lap_of, race_of
 from racecraft.replay.in_picture import is_picture, replay_in
 from racecraft.run.atomic import write_file
@@ -153,24 +153,30 @@ def pack_replay(replay: Replay) -> bytes:
     return pack(header, columns)
 
 
-def read_replay(path: str | Path) -> Replay:
+def read_replay(path: str | Path, *, max_numbers: int = MAX_CELLS) -> Replay:
     """Read a replay file, or the one inside a picture to send around; it may come from a stranger.
 
+    Args:
+        path: The file.
+        max_numbers: That all its rows may have, for who has less memory to spare; so much less the file may hold, too.
+
     Raises:
-        ReplayError: It is damaged, hostile, or of another version.
+        ReplayError: It is damaged, hostile, too long, or of another version.
     """
+    share = max_numbers / MAX_CELLS
     try:
-        data = read_bytes(path, max_bytes=MAX_FILE_BYTES)
+        data = read_bytes(path, max_bytes=int(share * MAX_FILE_BYTES))
     except ConfigError as error:
         raise ReplayError(str(error)) from error
     name = Path(path).name
     if is_picture(data):
         data = replay_in(data, name=name)
-    document, body = unpack(data, name=name)
-    return _replay(check_header(document, name=name), body, name=name)
+    document, body = unpack(data, name=name, max_bytes=int(share * MAX_BODY_BYTES))
+    del data
+    return _replay(check_header(document, name=name), body, name=name, max_numbers=max_numbers)
 
 
-def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
+def _replay(header: Header, body: memoryview, *, name: str, max_numbers: int) -> Replay:
     columns = _Columns(body, name)
     lines = columns.table(header.track.waypoints, header.track.types)
     try:
@@ -184,8 +190,8 @@ def _replay(header: Header, body: memoryview, *, name: str) -> Replay:
     width = row_width(conditions.num_objects)
     if len(header.cars) % conditions.cars_per_race:
         raise ReplayError(f"{name} has {len(header.cars)} cars, {conditions.cars_per_race} of which share a road.")
-    if sum(car.steps for car in header.cars) * width > MAX_CELLS:
-        raise ReplayError(f"{name} holds more than {MAX_CELLS:,} numbers.")
+    if sum(car.steps for car in header.cars) * width > max_numbers:
+        raise ReplayError(f"{name} holds more than {max_numbers:,} numbers.")
     driven = driven_track(track, conditions.rules)
     cars, rewards = [], []
     for index, car in enumerate(header.cars):

@@ -35,6 +35,7 @@ from racecraft.serve.contests.schemas import (
     NewLadder,
 )
 from racecraft.serve.contests.terms import Terms, settle, terms_of
+from racecraft.serve.evaluations.objects import MAX_SHOWN
 from racecraft.serve.jobs.queue import ENDED, JobQueue, new_job_id
 from racecraft.serve.models.garage import Garage
 from racecraft.serve.models.mirror import Mirror
@@ -244,7 +245,7 @@ class Contests:
         if found:
             from racecraft.film.ghost_source import check_sources
 
-            check_sources([str(path) for path in found.values()], track, rules, run=None)
+            check_sources([str(path) for path in found.values()], track, rules, run=None, max_numbers=MAX_SHOWN)
         return found
 
     def _add(

@@ -11,9 +11,11 @@ from fastapi import Path as PathPart
 from fastapi.responses import FileResponse
 
 from racecraft.contest.terms import TOGETHER
+from racecraft.errors import ReplayError
 from racecraft.serve.contests.files import MATCHES, REPLAY, VIDEO, read_match
 from racecraft.serve.contests.schemas import ContestCard, ContestDetail, NewHeat, NewLadder
 from racecraft.serve.context import Computes, InContext, TakesPlace
+from racecraft.serve.evaluations.objects import MAX_SHOWN
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.ghost_schemas import EvaluatedCard
 from racecraft.serve.races.ghosts import read_beside
@@ -100,7 +102,7 @@ def get_heat_share(contest: Id, context: InContext, language: Literal["en", "de"
     from racecraft.analysis.share_heat import share_heat
 
     file, found = context.contests.file(contest, REPLAY), context.contests.get(contest)
-    text = share_heat(file, _placed(found), title=_title(found), language=language)
+    text = share_heat(file, _placed(found), title=_title(found), language=language, max_numbers=MAX_SHOWN)
     return Response(text, media_type="text/html", headers={"Content-Disposition": 'attachment; filename="heat.html"'})
 
 
@@ -116,12 +118,12 @@ def get_heat_picture(contest: Id, context: InContext, language: Literal["en", "d
 
     file, found = context.contests.file(contest, REPLAY), context.contests.get(contest)
     with tempfile.TemporaryDirectory() as place:
-        path = Path(place) / "heat.png"
-        data = draw_heat(file, _placed(found), path, title=_title(found), language=language).read_bytes()
+        path, rows = Path(place) / "heat.png", _placed(found)
+        data = draw_heat(file, rows, path, title=_title(found), language=language, max_numbers=MAX_SHOWN).read_bytes()
     return Response(data, media_type="image/png", headers={"Content-Disposition": 'attachment; filename="heat.png"'})
 
 
-@router.get("/{contest}/replay")
+@router.get("/{contest}/replay", dependencies=[Computes])
 def get_contest_replay(
     contest: Id, context: InContext, match: Annotated[int | None, Query(ge=0, lt=100_000)] = None
 ) -> RaceReplay:
@@ -130,7 +132,10 @@ def get_contest_replay(
 
     found = context.contests.get(contest)
     if not found.is_ladder:
-        driven = [car.recording for car in read_replay(context.contests.file(contest, REPLAY)).cars]
+        file = context.contests.file(contest, REPLAY)
+        driven = [car.recording for car in read_replay(file, max_numbers=MAX_SHOWN).cars]
+        if any(row.car >= len(driven) for row in found.heat):
+            raise ReplayError(f"{file.name} does not have all cars of the heat.")
         cars = [car_of(row.car, row.name, driven[row.car], is_alone=False) for row in found.heat]
         track, road, ghosts = found.tracks[0], road_of(*driven), read_beside(context.contests.folder(contest))
     else:
@@ -141,7 +146,10 @@ def get_contest_replay(
         order = sorted(range(len(row.models)), key=lambda car: row.places[car])
         two, road, ghosts = document["cars"], [], []
         before: dict[str, Any] = {"objects": []}  # in files from before they were kept
-        cars = [ReplayCar(entry=car, model=row.models[car], **(before | two[car])) for car in order]
+        try:
+            cars = [ReplayCar(entry=car, model=row.models[car], **(before | two[car])) for car in order]
+        except (LookupError, TypeError, ValueError) as error:
+            raise NotFound(f"The ladder has no race {match}.") from error
         if found.kind in TOGETHER:  # what stood there stood there for both, as whoever drove longer saw it
             road = max(cars, key=lambda car: len(car.trace)).objects
             cars = [car.model_copy(update={"objects": []}) for car in cars]

@@ -31,7 +31,7 @@ from racecraft.race.policy import WEIGHTS, load_policy
 from racecraft.race.seeing import explain
 from racecraft.run import RunFolder
 from racecraft.serve.context import Computes, Context, InContext
-from racecraft.serve.evaluations.objects import objects_of
+from racecraft.serve.evaluations.objects import MAX_SHOWN, objects_of
 from racecraft.serve.evaluations.paid import rewards_of
 from racecraft.serve.evaluations.schemas import (
     EvaluationLaps,
@@ -181,7 +181,9 @@ def get_share(name: str, stamp: str, context: InContext, language: Literal["en",
     folder = context.garage.folder(name)
     trace_of(folder, stamp)
     headers = {"Content-Disposition": f'attachment; filename="{folder.name}.html"'}
-    return Response(share(folder, stamp, language=language), media_type="text/html", headers=headers)
+    return Response(
+        share(folder, stamp, language=language, max_numbers=MAX_SHOWN), media_type="text/html", headers=headers
+    )
 
 
 @router.get(
@@ -197,7 +199,8 @@ def get_picture(name: str, stamp: str, context: InContext, language: Literal["en
     folder = context.garage.folder(name)
     trace_of(folder, stamp)
     with tempfile.TemporaryDirectory() as place:
-        data = draw_share(folder, stamp, Path(place) / "share.png", language=language).read_bytes()
+        path = Path(place) / "share.png"
+        data = draw_share(folder, stamp, path, language=language, max_numbers=MAX_SHOWN).read_bytes()
     headers = {"Content-Disposition": f'attachment; filename="{folder.name}.png"'}
     return Response(data, media_type="image/png", headers=headers)
 

@@ -17,6 +17,9 @@ from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.sim.objects import OBJECT_KINDS
 
+MAX_SHOWN: Final = 8_000_000
+"""Numbers of a replay that the server reads to show it, 64 MB in memory: six hours of driving, or a hundred minutes
+among six objects. A worker may have written the file, and many may ask."""
 STILL: Final = 1e-6  # m and rad; what moves less stands
 RACERS: Final = ("racer", "frozen_racer", "gone_racer")
 
@@ -27,7 +30,7 @@ def objects_of(folder: RunFolder, stamp: str, laps: Sequence[TracedLap]) -> dict
     if not path.is_file():
         return {}
     try:
-        replay = read_replay(path)
+        replay = read_replay(path, max_numbers=MAX_SHOWN)
     except ReplayError:
         return {}
     if not replay.conditions.num_objects:

@@ -41,8 +41,8 @@ NEWEST: Final = 20
 MAX_LISTED: Final = 500
 MAX_READ: Final = 2000
 """Evaluations whose summaries are read for a list; it is to be there within a second."""
-MAX_BESIDE: Final = 64 << 20
-"""Bytes of the file that says where the ghosts were."""
+MAX_BESIDE: Final = 16 << 20
+"""Bytes of the file that says where the ghosts were, which a worker may have written; an hour of sixteen has them."""
 
 
 def entry_name(starter: dict[str, Any]) -> str:

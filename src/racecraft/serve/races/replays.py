@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from racecraft.analysis import driven_direction, sectors_of
+from racecraft.errors import ReplayError
 from racecraft.race.recording import Recording
-from racecraft.replay.replay import read_replay
+from racecraft.replay.replay import MAX_CELLS, read_replay
 from racecraft.serve.evaluations.objects import objects_in
 from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.races.schemas import RaceReplay, ReplayCar, ReplayGhost
@@ -37,9 +38,18 @@ def car_of(entry: int, model: str, recording: Recording, *, grain: int = 1, is_a
     )
 
 
-def trial_of(path: Path, trial: int, *, entry: int, model: str, grain: int = 1) -> ReplayCar:
-    """One trial of a replay file, see `car_of`; trials count from 0."""
-    return car_of(entry, model, read_replay(path).cars[trial].recording, grain=grain)
+def trial_of(
+    path: Path, trial: int, *, entry: int, model: str, grain: int = 1, max_numbers: int = MAX_CELLS
+) -> ReplayCar:
+    """One trial of a replay file, see `car_of` and `read_replay`; trials count from 0.
+
+    Raises:
+        ReplayError: The file cannot be read, or has no such trial.
+    """
+    cars = read_replay(path, max_numbers=max_numbers).cars
+    if trial >= len(cars):
+        raise ReplayError(f"{path.name} has no trial {trial + 1}.")
+    return car_of(entry, model, cars[trial].recording, grain=grain)
 
 
 def road_of(*recordings: Recording) -> list[RoadObject]:

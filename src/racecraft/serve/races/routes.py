@@ -12,7 +12,8 @@ from fastapi.responses import FileResponse
 from racecraft.contest.terms import MAX_TRIALS
 from racecraft.errors import ConfigError
 from racecraft.judging.race import FORMAT
-from racecraft.serve.context import InConsoles, InContext, InUser, TakesPlace
+from racecraft.serve.context import Computes, InConsoles, InContext, InUser, TakesPlace
+from racecraft.serve.evaluations.objects import MAX_SHOWN
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.ghosts import read_beside
@@ -119,7 +120,7 @@ def get_entry_replay(race_id: Id, entry_id: Id, context: InContext) -> FileRespo
     return _file(context, race_id, entry_id, REPLAY, media_type="application/octet-stream")
 
 
-@router.get("/{race_id}/replay")
+@router.get("/{race_id}/replay", dependencies=[Computes])
 def get_replay(
     race_id: Id,
     context: InContext,
@@ -164,7 +165,7 @@ def _car(entry: int, job: Job, runs: FilePath, trial: int) -> ReplayCar:
     path = entry_folder(runs, job.id) / REPLAY
     if not path.is_file():
         raise NotFound(f"{job.run!r} has no replay in this race.")
-    return trial_of(path, trial, entry=entry, model=job.run)
+    return trial_of(path, trial, entry=entry, model=job.run, max_numbers=MAX_SHOWN)
 
 
 def _old_car(entry: int, job: Job, runs: FilePath) -> ReplayCar:
