@@ -272,14 +272,15 @@ def test_servers_that_are_stopped_do_not_count_as_losses(queue: JobQueue) -> Non
     assert state(queue, job.id) == "queued"
 
 
-def test_what_runs_is_counted_by_kind(queue: JobQueue) -> None:
+def test_what_runs_takes_places_of_its_kinds_on_its_machine(queue: JobQueue) -> None:
     for kind in ("train", "train", "evaluate"):
         queue.add(kind, "a", {})
-    assert queue.num_running(("train", "evaluate"), machine="") == 0
+    assert queue.has_room(("train", "evaluate"), machine="", places=1)
     queue.claim(("train",), owner="x")
     queue.claim(("evaluate",), owner="y")
-    assert queue.num_running(("train",), machine="") == 1
-    assert queue.num_running(("train", "evaluate"), machine="") == 2
+    assert [queue.has_room(("train",), machine="", places=places) for places in (1, 2)] == [False, True]
+    assert [queue.has_room(("train", "evaluate"), machine="", places=places) for places in (2, 3)] == [False, True]
+    assert queue.has_room(("train", "evaluate"), machine="elsewhere", places=1)
 
 
 def test_every_kind_of_job_has_a_function() -> None:

@@ -280,12 +280,6 @@ class JobQueue:
             until = self._database.moment(session) + WATCHED
             session.execute(sa.update(Job).where(Job.id == job_id).values(watched_until=until))
 
-    def num_running(self, kinds: tuple[str, ...], *, machine: str) -> int:
-        """How many jobs of these kinds run on a machine, whoever started them."""
-        query = sa.select(sa.func.count()).where(Job.state == "running", Job.kind.in_(kinds), Job.machine == machine)
-        with self._database.transaction() as session:
-            return session.scalar(query) or 0
-
     def has_room(self, kinds: tuple[str, ...], *, machine: str, places: int) -> bool:
         """Whether a machine with so many places for these kinds may start one more."""
         with self._database.transaction() as session:
