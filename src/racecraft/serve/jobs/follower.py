@@ -20,6 +20,8 @@ BEAT: Final = 0.25  # s between two looks at cars
 BEATS: Final = 4  # between two looks at runs
 PATIENCE: Final = 3.0  # s after which nobody looks any more
 MAX_ENDED: Final = 10_000
+SEEN: Final = 15.0  # s that somebody waits for what another machine made; a store may not answer for minutes
+AT_ONCE: Final = 4  # jobs whose results are brought for who waits
 _LOG: Final = logging.getLogger("racecraft.serve")
 
 
@@ -38,6 +40,8 @@ class Follower:
         self._followed: dict[str, Job] = {}
         self._ended: set[str] = set()  # jobs whose results are here
         self._shown: dict[tuple[int, str], bytes] = {}
+        self._bringing: dict[str, float] = {}  # since when, by jobs whose results are on their way
+        self._brought = threading.Condition()
         self._is_stopped = threading.Event()
 
     def run(self) -> None:
@@ -64,21 +68,48 @@ class Follower:
         self._looks[user_id, run] = time.monotonic()
 
     def see(self, job: Job) -> Job:
-        """Before somebody is told that a job has ended: have here what another machine made of it."""
+        """Before somebody is told that a job has ended: have here what another machine made of it.
+
+        Who asks waits for a moment, and not at all while the store lets others wait: it is told all the same, and
+        brought later.
+        """
         if self._artifacts is None or not job.travels or job.state not in ENDED or job.id in self._ended:
             return job
+        with self._brought:
+            until = time.monotonic() + SEEN
+            while job.id not in self._bringing and len(self._bringing) >= AT_ONCE and self._waits(until):
+                pass
+            if job.id not in self._bringing and len(self._bringing) < AT_ONCE and job.id not in self._ended:
+                self._bringing[job.id] = time.monotonic()
+                # of its own, as neither requests nor the server's end wait for a store
+                threading.Thread(target=self._see, args=(self._artifacts, job), name="bring", daemon=True).start()
+            while job.id in self._bringing and self._waits(until):
+                pass
+        return job
+
+    def _waits(self, until: float) -> bool:
+        """Wait for something to be brought; False at the end of somebody's patience, or where another's has ended."""
+        oldest = min(self._bringing.values()) + SEEN
+        left = min(until, oldest) - time.monotonic()
+        if left > 0:
+            self._brought.wait(left)
+        return left > 0
+
+    def _see(self, artifacts: Artifacts, job: Job) -> None:
         try:
             if job.machine != self._settings.machine:
-                self._bring(self._artifacts, job)
+                self._bring(artifacts, job)
             if (folder := folder_of(job)) is not None:  # it is here for good
-                self._artifacts.of(job.user_id).shelf(folder[0]).forget(folder[1])
-        except (RunError, OSError) as error:  # it is told all the same, and brought later
+                artifacts.of(job.user_id).shelf(folder[0]).forget(folder[1])
+            if len(self._ended) >= MAX_ENDED:
+                self._ended.clear()
+            self._ended.add(job.id)
+        except (RunError, OSError) as error:
             _LOG.error("%s", error)
-            return job
-        if len(self._ended) >= MAX_ENDED:
-            self._ended.clear()
-        self._ended.add(job.id)
-        return job
+        finally:
+            with self._brought:
+                del self._bringing[job.id]
+                self._brought.notify_all()
 
     def _follow(self, artifacts: Artifacts) -> None:
         """Bring what is new of every job that is being done elsewhere, and once more when that has ended."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -13,6 +14,9 @@ from racecraft.errors import ConfigError
 from racecraft.extras import needed_for
 
 SCHEMES: Final = ("s3://", "file:///")
+AT_ONCE: Final = 24
+"""Threads of a process that ask a store; a server has 40, and a store may take minutes to answer none."""
+WAIT: Final = 5.0  # s for a place among them, and none while others waited in vain
 
 
 class NoAnswer(Exception):
@@ -79,6 +83,7 @@ class ObjectStore:
             import obstore
             from obstore import exceptions, store
         self.url = url
+        self._places, self._is_stuck = threading.Semaphore(AT_ONCE), False
         self._api, self._missing = obstore, (exceptions.NotFoundError, FileNotFoundError)
         self._broken = (exceptions.BaseError, OSError)
         endpoint = os.environ.get("AWS_ENDPOINT_URL", os.environ.get("AWS_ENDPOINT", ""))
@@ -101,9 +106,13 @@ class ObjectStore:
             return Content(reply.meta["size"], self._chunks(reply))
 
     def _chunks(self, reply: Any) -> Iterator[bytes]:
-        with self._translated():
-            for chunk in reply.stream():
-                yield bytes(chunk)
+        stream = iter(reply.stream())
+        while True:
+            with self._translated():  # not while who reads takes its time
+                chunk = next(stream, None)
+            if chunk is None:
+                return
+            yield bytes(chunk)
 
     def put(self, key: str, data: bytes | Path) -> None:
         """Have this under a key."""
@@ -136,12 +145,19 @@ class ObjectStore:
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
+        """One of the places, and errors of ours."""
+        if not self._places.acquire(timeout=0.0 if self._is_stuck else WAIT):
+            self._is_stuck = True
+            raise NoAnswer("too many wait for it")
         try:
             yield
         except self._missing as error:
             raise NoObject(first_line(error)) from error
         except self._broken as error:
             raise NoAnswer(first_line(error)) from error
+        finally:
+            self._is_stuck = False
+            self._places.release()
 
 
 def first_line(error: BaseException) -> str:
