@@ -26,12 +26,14 @@ from numpy.typing import NDArray
 from racecraft.race.policy import NetworkPolicy
 from racecraft.sim import Simulation
 from racecraft.sim.columns import ROW_COLUMNS
+from racecraft.sim.objects import OBJECT_KINDS
 
 NAME: Final = ".live"
 """Of the file, in the run folder."""
 SPACING: Final = 0.05  # s between two looks, at least
 MAX_CARS: Final = 256  # that are shown
 MAX_BYTES: Final = 1 << 20
+LARGEST: Final = 1e6  # of any number that is shown, in its unit; roads lie within 10,000 m
 HEADER: Final = 9  # int64
 POSE: Final = 6
 OBJECT: Final = 4
@@ -142,7 +144,10 @@ class LiveReader:
         return memory is not None and _is_fresh(memory[: HEADER * 8].view(np.int64).tolist())
 
     def look(self, *, after: int = -1) -> Look | None:
-        """The present moment, or None when there is none, it is stale, or it is the one with number `after`."""
+        """The present moment, or None when there is none, it is stale, or it is the one with number `after`.
+
+        None, too, of one that cannot be, as another machine may have written it.
+        """
         memory = self._open()
         if memory is None:
             return None
@@ -153,6 +158,8 @@ class LiveReader:
             if header[0] % 2 == 0:
                 _, poses, steps, objects, policy, frame = (part.copy() for part in _parts(memory, header))
                 if int(memory[:8].view(np.int64)[0]) == header[0]:
+                    if not _can_be(poses, objects, policy):
+                        return None
                     return Look(
                         sequence=header[0],
                         step=header[1],
@@ -211,6 +218,17 @@ def write_live(folder: Path, data: bytes) -> None:
     fresh = folder / f"{NAME}.new"
     fresh.write_bytes(memory.tobytes())
     os.replace(fresh, folder / NAME)
+
+
+def _can_be(poses: NDArray[np.float32], objects: NDArray[np.float32], policy: NDArray[np.float32]) -> bool:
+    """Whether these are a few cars with numbers, among objects that there are."""
+    kinds = objects[:, 0]
+    is_known = bool(((kinds >= 0) & (kinds < len(OBJECT_KINDS))).all())
+    return (
+        len(poses) <= MAX_CARS
+        and is_known
+        and all((np.abs(part) <= LARGEST).all() for part in (poses, objects, policy))
+    )
 
 
 def _is_fresh(header: list[int]) -> bool:
