@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 import warnings
@@ -76,12 +77,16 @@ def test_who_tells_the_truth_is_believed(hostile: Hostile) -> None:
         ({"iat": int(time.time()) + HOUR}, "of another time"),
         ({"exp": None}, "of another time"),
         ({"exp": "soon"}, "of another time"),
+        *(({name: number}, "of another time") for name in ("exp", "iat", "nbf") for number in (math.inf, math.nan)),
+        ({"aud": [[CLIENT]]}, "meant for somebody else"),
+        ({"aud": {CLIENT: 1}}, "meant for somebody else"),
         ({"sub": None}, "cannot be read"),
         ({"sub": ""}, "cannot be read"),
         ({"sub": 7}, "cannot be read"),
         ({"sub": ["7"]}, "cannot be read"),
         ({"sub": "7" * 256}, "cannot be read"),
         ({"sub": "7\n"}, "cannot be read"),
+        ({"sub": "7\0"}, "cannot be read"),
         ({"at_hash": "AAAA"}, "cannot be read"),
     ],
 )
@@ -342,6 +347,31 @@ def test_whom_a_league_lets_in(hostile: Hostile) -> None:
     hostile.userinfo = {**true, "sub": "8"}  # of somebody else
     with pytest.raises(NotLetIn, match="cannot be read"):
         come(hostile, league)
+
+
+@pytest.mark.parametrize(
+    ("token", "userinfo", "is_in"),
+    [
+        ({"email": "ada@school.example"}, {"email": "ada@home.example", "email_verified": True}, False),
+        ({"email_verified": True}, {"email": "ada@school.example", "email_verified": False}, False),
+        ({"email_verified": True}, {"email": "ada@school.example"}, False),
+        ({"email": "ada@home.example", "email_verified": True}, {"email": "ada@school.example"}, False),
+        ({"email": "ada@school.example", "email_verified": False}, {"email_verified": True}, False),
+        ({"email": "ada@school.example"}, {"email": "ada@school.example", "email_verified": True}, True),
+        ({"email": "ada@school.example", "email_verified": True}, {}, True),
+        ({}, {"email": "ada@school.example", "email_verified": True}, True),
+    ],
+)
+def test_who_confirms_one_address_confirms_no_other(
+    hostile: Hostile, token: dict[str, Any], userinfo: dict[str, Any], is_in: bool
+) -> None:
+    hostile.claims, hostile.userinfo = token, {"sub": "7", **userinfo}
+    league = hostile.league(domains=("@school.example",))
+    if is_in:
+        assert come(hostile, league).subject == "7"
+    else:
+        with pytest.raises(NotLetIn, match="not one of those that this league lets in"):
+            come(hostile, league)
 
 
 @pytest.mark.parametrize(

@@ -196,7 +196,7 @@ class Provider:
         )
         if more.get("sub") != claims["sub"]:
             raise NotLetIn(f"What {self.label} says of you cannot be read.")
-        return {**more, **claims}
+        return _together(claims, more)
 
     def _keys(self, anew: bool) -> KeySet:
         return self._discovery.keys(anew=anew)
@@ -263,6 +263,15 @@ class Provider:
     def _log(self, error: NoAnswer) -> None:
         why = " ".join(str(error).split())[:MAX_LOGGED]
         logging.getLogger("racecraft.serve").warning("Sign-in through %s: %s", self.label, why)
+
+
+def _together(claims: dict[str, Any], more: dict[str, Any]) -> dict[str, Any]:
+    """What two answers say of somebody, the first before the second; an address is confirmed by who names it alone."""
+    told = {**more, **claims}
+    if "email" in told:
+        named = [one for one in (claims, more) if one.get("email") == told["email"]]
+        told["email_verified"] = next((one["email_verified"] for one in named if "email_verified" in one), None)
+    return told
 
 
 def _written(value: object) -> str | None:
