@@ -94,7 +94,7 @@ def test_presets_that_neither_remember_nor_loop_over_objects_are_numeric(name):
     if name in NUMERIC:
         assert "def kernel(" in numeric_source(load_preset(name))
     else:
-        assert name in ("dodge", "duel", "lap_time", "object_avoidance", "overtake", "touring")
+        assert name in ("dodge", "duel", "lap_time", "object_avoidance", "overtake", "slalom", "touring")
         with pytest.raises(NotNumeric):
             numeric_source(load_preset(name))
 

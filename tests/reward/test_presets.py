@@ -136,6 +136,9 @@ def test_dodge_pays_less_the_nearer_and_the_more_squarely_an_object_is_ahead(ahe
     assert reward("dodge", **objects) == pytest.approx(free * (1.0 - danger), abs=1e-9)
     assert reward("dodge", **{**objects, "closest_objects": [0, 1]}) == pytest.approx(free * (1.0 - danger), abs=1e-9)
     assert reward("dodge", **{**objects, "is_crashed": True}) == -1.0
+    assert reward("slalom", **objects) == reward("dodge", **objects)
+    assert reward("slalom", **{**objects, "is_crashed": True}) == -15.0
+    assert reward("slalom", **{**objects, "is_offtrack": True}) == -15.0
 
 
 @pytest.mark.parametrize(("name", "mistake"), [("lap_time", -1.0), ("duel", -8.0)])

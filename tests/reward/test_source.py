@@ -23,6 +23,7 @@ def test_the_presets():
         "overtake",
         "progress_pace",
         "racing",
+        "slalom",
         "speed_gate",
         "stay_inside",
         "touring",

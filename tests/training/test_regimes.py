@@ -40,7 +40,10 @@ def test_the_last_row_decides_everything() -> None:
     [
         ({"objects": BOTS}, {"reward": OBJECTS, "start": TIME_TRIAL, "ppo": OBJECTS, "good": OBJECTS}),
         ({"objects": BOTS, "most_speed": 1.0}, {"distill": OBJECTS, "ppo": OBJECTS}),
-        ({"objects": BOTS, "most_speed": 1.4}, {"distill": FAST_OBJECTS, "ppo": OBJECTS, "good": OBJECTS}),
+        (
+            {"objects": BOTS, "most_speed": 1.4},
+            {"reward": FAST_OBJECTS, "distill": FAST_OBJECTS, "ppo": OBJECTS, "good": OBJECTS},
+        ),
         ({"opponents": RIVALS}, {"reward": DUEL, "start": DUEL, "distill": DUEL, "critic": DUEL, "good": TIME_TRIAL}),
         ({"objects": BOTS, "opponents": RIVALS}, {"reward": OBJECTS, "start": DUEL, "ppo": OBJECTS, "critic": DUEL}),
         ({"num_tracks": 2}, {"reward": TIME_TRIAL, "start": MANY_TRACKS, "evaluation_trials": MANY_TRACKS}),

@@ -414,6 +414,24 @@ def test_a_short_race_training_leaves_its_student_time(until: str, steps: int) -
     assert alone.distill.teacher_steps > 600_000  # its teacher is quicker
 
 
+@pytest.mark.parametrize(
+    ("asked", "reward"),
+    [
+        ({}, "dodge"),
+        ({"actions": "aws"}, "dodge"),
+        ({"actions": "safe"}, "slalom"),
+        ({"actions": "continuous"}, "slalom"),
+        ({"actions": "default", "algorithm": "ppo"}, "slalom"),
+        ({"actions": "continuous", "algorithm": "sac"}, "slalom"),
+        ({"actions": "fast", "reward": "racing"}, "racing"),
+    ],
+)
+def test_mistakes_among_objects_are_dear_for_who_drives_faster_than_a_walk(asked: dict[str, str], reward: str) -> None:
+    boxes = Objects(obstacles=Obstacles(count=2))
+    assert make_plan("oval", objects=boxes, **asked).reward == load_preset(reward)  # type: ignore[arg-type]
+    assert make_plan("oval", **asked).reward == load_preset("racing")  # type: ignore[arg-type]
+
+
 def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:
     ppo = PPOConfig(num_envs=2, num_steps=8, minibatch_size=16, update_epochs=1)
     boxes = Objects(obstacles=Obstacles(count=2))

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { ActionPreset, Choices } from "../src/api/client";
-import { newModel, suited, type Known, type Wishes } from "../src/lib/newmodel";
+import { newModel, repaid, suited, type Known, type Wishes } from "../src/lib/newmodel";
 import { newRoad } from "../src/lib/raceterms";
 
 const space: ActionPreset = {
@@ -136,6 +136,25 @@ describe("another race", () => {
     expect(suited({ from: "object-avoidance", to: "head-to-bot" }, { ...wishes, ...among }, all)).toEqual(among);
     const sac = { ...wishes, ...among, algorithm: "sac" };
     expect(suited({ from: "head-to-bot", to: "time-trial" }, sac, all).algorithm).toBe("sac");
+  });
+
+  it("pays dearer mistakes among objects to who drives faster than a walk", () => {
+    const [dodge, slalom] = ["dodge", "slalom"].map((name) => ({ name, description: "", source: `# ${name}` }));
+    const steady: ActionPreset = { ...space, name: "steady", actions: [{ steering_angle: 0, speed: 1 }] };
+    const fast: ActionPreset = { ...space, name: "fast", actions: [{ steering_angle: 0, speed: 4 }] };
+    const offered = { rewards: [...known.rewards, dodge!, slalom!], spaces: [space, steady, continuous, fast] };
+    const [walking, racing] = [steady, fast].map((one) => ({ race: "object-avoidance", space: one }));
+    expect(repaid("# dodge", walking!, racing!, offered.rewards)).toBe("# slalom");
+    expect(repaid("# slalom", racing!, walking!, offered.rewards)).toBe("# dodge");
+    expect(repaid("# mine", walking!, racing!, offered.rewards)).toBe("# mine");
+    const any = { race: "head-to-bot", space: { ...continuous, speed: [0.5, 4] as [number, number] } };
+    expect(repaid("# dodge", walking!, any, offered.rewards)).toBe("# slalom");
+    const chosen = { ...wishes, space: fast };
+    const among = suited({ from: "time-trial", to: "head-to-bot" }, chosen, offered);
+    expect([among.source, among.space.name]).toEqual(["# slalom", "fast"]);
+    expect(suited({ from: "head-to-bot", to: "time-trial" }, { ...chosen, ...among }, offered).source).toBe(
+      wishes.source,
+    );
   });
 
   it("leaves alone what somebody chose", () => {

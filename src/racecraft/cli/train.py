@@ -43,7 +43,9 @@ def train(
     reward: Annotated[
         str,
         typer.Option(
-            "--reward", "-r", help="Preset or reward_function.py; racing, among objects dodge, head to head duel."
+            "--reward",
+            "-r",
+            help="Preset or reward_function.py; racing, among objects dodge (slalom above 1 m/s), head to head duel.",
         ),
     ] = "",
     until: Annotated[

@@ -67,7 +67,7 @@ def train(
         track: Name of a track, or path of a track file; or several, as `racecraft.track.load_tracks` reads them; by
             default ``reinvent_2018``.
         reward: Name of a preset, or path of a ``reward_function.py``; by default ``racing``, among objects ``dodge``,
-            against opponents ``duel``.
+            with actions above 1 m/s ``slalom``, against opponents ``duel``.
         until: When to stop: ``"5 laps"`` (the default), ``"8.8 s lap"``, ``"no better lap"``, ``"10 minutes"``,
             ``"200000 steps"``, or several joined by ``or``; by default among objects ``"20 laps or 10 minutes"``,
             against opponents ``"10 minutes"``, and for who is taught to be fast ``"no better lap or 10 minutes"``.

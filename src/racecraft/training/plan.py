@@ -85,10 +85,6 @@ def make_plan(
     objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
     opponents = settings.get("opponents", None if before is None else before.opponents)
     regime, method = regime_of(objects=objects, opponents=opponents), METHODS.get(algorithm, METHODS["ppo"])
-    if reward or theirs is None:
-        source, is_foreign = load_reward(reward or regime.reward), False
-    else:
-        source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
     elif theirs is None or actions is not None:
@@ -106,6 +102,11 @@ def make_plan(
         metadata = theirs.read_model_metadata()
     if theirs is not None and model_metadata is None and sensors:
         metadata = replace(metadata, sensors=tuple(sensors))
+    if reward or theirs is None:
+        kind = {"objects": objects, "opponents": opponents, "most_speed": metadata.action_space.most_speed}
+        source, is_foreign = load_reward(reward or regime_of(**kind).reward), False
+    else:
+        source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
     if algorithm:
         metadata = _with_algorithm(metadata, algorithm)
     is_fast = algorithm == "distill" and metadata.action_space.kind == "continuous"

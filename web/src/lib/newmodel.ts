@@ -58,6 +58,23 @@ const RACED: Usual = {
 const usualOf = (race: string): Usual =>
   race === "head-to-head" ? RACED : ["object-avoidance", "head-to-bot"].includes(race) ? AMONG : ALONE;
 
+const WALK = 1; // m/s
+
+/** What pays for a race's laps; among boxes and bots mistakes are dear for who drives faster than a walk. */
+function rewardOf(race: string, space: ActionPreset | undefined): string {
+  const { reward } = usualOf(race);
+  const speeds = space?.speed ?? space?.actions.map((action) => action.speed) ?? [];
+  return reward === AMONG.reward && Math.max(...speeds, 0) > WALK ? "slalom" : reward;
+}
+
+type Paid = { race: string; space: ActionPreset | undefined };
+
+/** The reward for other actions, or another race: what nobody chose becomes what suits them. */
+export function repaid(source: string, from: Paid, to: Paid, rewards: RewardPreset[]): string {
+  const sourceOf = ({ race, space }: Paid) => rewards.find((preset) => preset.name === rewardOf(race, space))?.source;
+  return source === sourceOf(from) ? (sourceOf(to) ?? source) : source;
+}
+
 /** The same wishes for another race: what nobody chose becomes what suits it. */
 export function suited(
   races: { from: string; to: string },
@@ -65,12 +82,13 @@ export function suited(
   { rewards, spaces }: Pick<Known, "rewards" | "spaces">,
 ): Suited {
   const [from, to] = [usualOf(races.from), usualOf(races.to)];
-  const sourceOf = (name: string) => rewards.find((preset) => preset.name === name)?.source;
   const isUsual = presetOf(wishes.space, spaces)?.name === from.space;
+  const space = (isUsual && spaces.find((preset) => preset.name === to.space)) || wishes.space;
+  const paid = { race: races.from, space: wishes.space };
   const unless = <T>(wish: T, before: T, now: T): T => (wish === before ? now : wish);
   return {
-    source: wishes.source === sourceOf(from.reward) ? (sourceOf(to.reward) ?? wishes.source) : wishes.source,
-    space: (isUsual && spaces.find((preset) => preset.name === to.space)) || wishes.space,
+    source: repaid(wishes.source, paid, { race: races.to, space }, rewards),
+    space,
     sensors: wishes.sensors.join() === from.sensors.join() ? to.sensors : wishes.sensors,
     until: unless(wishes.until, from.until, to.until),
     critic: unless(wishes.critic, from.critic, to.critic),

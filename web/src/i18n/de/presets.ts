@@ -20,6 +20,8 @@ export const presets: Record<keyof typeof english, string> = {
     "In weniger Schritten ankommen: alle hundert Schritte ein Zuschlag für ein Auto, das vor dem Zieltempo liegt.",
   preset_racing:
     "Rennen: Jeder Meter entlang der Strecke in diesem Schritt zählt. Lernt schnell und lernt, schnell zu fahren.",
+  preset_slalom:
+    "Zwischen Kisten und anderen Autos schneller als im Schritt fahren: bezahlt wie beim Ausweichen, aber Fehler sind teuer.",
   preset_speed_gate: "Auf der Strecke bleiben und nicht trödeln: Unter einem Mindesttempo ist die halbe Belohnung weg.",
   preset_stay_inside:
     "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",
@@ -41,6 +43,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_name_overtake: "Überholen",
   preset_name_progress_pace: "Zieltempo",
   preset_name_racing: "Rennen",
+  preset_name_slalom: "Slalom",
   preset_name_speed_gate: "Mindesttempo",
   preset_name_stay_inside: "Drinnen bleiben",
   preset_name_touring: "Fremde Straßen",
