@@ -1,8 +1,8 @@
-"""Race among boxes and other cars at more than a walk: as `dodge`, but mistakes are dear.
+"""Race among boxes and other cars, faster than a walk: pay for every metre, and make mistakes dear.
 
-Pay for every metre, less the more squarely the next object stands in the way: by nothing two metres before it, by
-nearly all of it from two thirds of a metre on. A car at 4 m/s is paid for a lap in a few seconds; were a mistake as
-cheap as a metre of it, it would rather run into something now and then than lift.
+As `dodge`, less the more squarely the next object stands in the way: by nothing two metres before it, by nearly all of
+it from two thirds of a metre on. A car at 4 m/s is paid for a lap in a few seconds; were a mistake as cheap as a metre
+of it, it would rather run into something now and then than lift.
 """
 
 import math

@@ -21,7 +21,7 @@ export const presets: Record<keyof typeof english, string> = {
   preset_racing:
     "Rennen: Jeder Meter entlang der Strecke in diesem Schritt zählt. Lernt schnell und lernt, schnell zu fahren.",
   preset_slalom:
-    "Zwischen Kisten und anderen Autos schneller als im Schritt fahren: bezahlt wie beim Ausweichen, aber Fehler sind teuer.",
+    "Zwischen Kisten und anderen Autos schneller als im Schritt fahren: Jeder Meter zählt, und Fehler sind teuer.",
   preset_speed_gate: "Auf der Strecke bleiben und nicht trödeln: Unter einem Mindesttempo ist die halbe Belohnung weg.",
   preset_stay_inside:
     "Innerhalb der Ränder bleiben: Jede Linie ist recht, solange alle Räder mit etwas Luft auf der Straße sind.",

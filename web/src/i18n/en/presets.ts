@@ -16,7 +16,7 @@ export const presets = {
     "Finish in fewer steps: a bonus every hundred steps for a car that is ahead of the target pace.",
   preset_racing:
     "Race: pay for every metre gained along the track in this step. Learns fast, and learns to drive fast.",
-  preset_slalom: "Race among boxes and other cars at more than a walk: pay as in dodge, but mistakes are dear.",
+  preset_slalom: "Race among boxes and other cars, faster than a walk: pay for every metre, and make mistakes dear.",
   preset_speed_gate: "Stay on the track and do not dawdle: below a speed threshold half of the reward is gone.",
   preset_stay_inside:
     "Stay inside the borders: any line will do, as long as all wheels are on the road with room to spare.",
