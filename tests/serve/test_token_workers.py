@@ -360,8 +360,9 @@ def test_a_result_that_could_not_be_read_again_is_refused(place: Place) -> None:
             f"/api/workers/{hand.name}/finish", content=body, headers={"content-type": "application/json"}
         )
         assert "cannot be kept" in refused(reply, 422), told
+    assert "wrong at 'steps'" in refused(hand.post("finish", job=job, state="done", result={"steps": "x"}), 422)
     ok(hand.post("finish", job=job, state="done", result={"x": "whole"}), 204)
-    for path in ("/api/jobs", f"/api/jobs/{job}", "/api/models", f"/api/models/{name}"):
+    for path in ("/api/jobs", f"/api/jobs/{job}", "/api/models", f"/api/models/{name}", "/api/choices"):
         ok(place.console.client.get(path))
 
 

@@ -21,6 +21,7 @@ from racecraft.serve.store.tables import Job
 from racecraft.serve.workers import schemas
 from racecraft.serve.workers.leases import Lease
 from racecraft.serve.workers.parcels import Key
+from racecraft.serve.workers.results import check_result
 from racecraft.version import VERSION
 
 SMALL: Final = 1 << 20
@@ -86,6 +87,8 @@ def finish_job(body: schemas.End, lease: InLease, consoles: InConsoles) -> Respo
     """A job is done, or failed."""
     job = lease.required()
     error = None if body.error is None else body.error.model_dump()
+    if body.state == "done":
+        check_result(job.kind, body.result)
     lease.finish(body.job, body.state, result=body.result, error=error)
     consoles.owner.parcels.forget(job)
     return Response(status_code=204)
