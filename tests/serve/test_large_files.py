@@ -14,17 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft.errors import RacecraftError, ReplayError
+from racecraft.errors import RacecraftError, ReplayError, RunError
 from racecraft.film.ghost_source import check_sources
 from racecraft.race import Autopilot, RaceRules, evaluate
 from racecraft.replay import Replay, read_replay, write_replay
 from racecraft.replay.codec import pack, pack_column, unpack
 from racecraft.replay.header import check_header
 from racecraft.run import RunFolder
+from racecraft.run.simtrace import COLUMNS, read_simtrace
 from racecraft.serve.contests import routes as contests
 from racecraft.serve.contests.files import MAX_CONTENTS, MAX_MATCH, read_match
 from racecraft.serve.context import Computes
 from racecraft.serve.evaluations.objects import MAX_SHOWN, objects_of
+from racecraft.serve.evaluations.traces import read_laps, read_start
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races import routes as races
 from racecraft.serve.races.ghosts import BESIDE, MAX_BESIDE, read_beside
@@ -163,6 +165,18 @@ def test_an_archive_of_races_that_is_damaged(tmp_path: Path) -> None:
     for bad in (b"", b"PK", whole[:-1], whole + b"x", encrypted, method, other, b"PK\5\6" + bytes(18)):
         (tmp_path / "bad.zip").write_bytes(bad)
         refused(tmp_path / "bad.zip")
+
+
+def test_a_line_of_steps_is_not_read_without_end(tmp_path: Path) -> None:
+    path = tmp_path / "0-iteration.csv"
+    head = ",".join(COLUMNS)
+    for begin in ("", f"{head}\n"):
+        path.write_text(f"{begin}{',' * (16 << 20)}\n")
+        with in_little_memory():
+            with pytest.raises(RunError, match="a line has more than 16,384 characters"):
+                read_simtrace(path)
+            assert read_laps(path) == []
+            assert read_start(path) == []
 
 
 def test_ghosts_of_days_are_not_read(tmp_path: Path) -> None:

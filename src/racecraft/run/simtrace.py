@@ -7,7 +7,7 @@ so a car's steps wait in memory until its episode ends. Numbers have full precis
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -53,6 +53,7 @@ MAX_BYTES = 1 << 31  # of all files of a run; beyond it every other iteration is
 MAX_FILES = 4096  # the same for their number
 EPISODES_PER_ITERATION = 20  # of AWS, unless hyperparameters say otherwise
 MAX_READ_ROWS = 2_000_000
+MAX_LINE = 1 << 14  # characters; a step has up to 300
 MAX_STATUS = 40  # characters of a row's episode_status; ours and AWS's have up to 11
 
 _KEPT = (
@@ -371,7 +372,7 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
     names: list[str] | None = None
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            for row in csv.reader(file):
+            for row in csv.reader(short_lines(file)):
                 if names is None:
                     names = row if row[:1] == ["episode"] else list(COLUMNS[: len(row)])
                     if len([name for name in names if name in COLUMNS]) not in READABLE:
@@ -395,6 +396,18 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
         return {name: _parse(name, columns[name]) for name in names if name in COLUMNS}
     except (ValueError, OverflowError) as error:
         raise RunError(f"{path} is not a sim-trace: {error}.") from error
+
+
+def short_lines(file: TextIO) -> Iterator[str]:
+    """The lines of a stranger's file of steps; one of millions of fields would fill the memory.
+
+    Raises:
+        csv.Error: One is too long.
+    """
+    while line := file.readline(MAX_LINE + 1):
+        if len(line) > MAX_LINE:
+            raise csv.Error(f"a line has more than {MAX_LINE:,} characters")
+        yield line
 
 
 def _parse(name: str, texts: tuple[str, ...]) -> NDArray[Any]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from racecraft.race.recording import REFERENCE_AHEAD
+from racecraft.run.simtrace import short_lines
 
 MAX_ROWS: Final = 60_000
 
@@ -29,7 +30,7 @@ def read_laps(path: Path) -> list[Lap]:
     episode, began = None, 0.0
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            for number, row in enumerate(csv.DictReader(file)):
+            for number, row in enumerate(csv.DictReader(short_lines(file))):
                 if number >= MAX_ROWS:
                     break
                 now = float(row["tstamp"])
@@ -48,7 +49,7 @@ def read_start(path: Path) -> list[int]:
     """Where the first lap in a file of steps began: x, y, heading in mm and mrad; empty where it cannot be read."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            return _pose(next(csv.DictReader(file)))
+            return _pose(next(csv.DictReader(short_lines(file))))
     except (OSError, StopIteration, KeyError, TypeError, ValueError, OverflowError, csv.Error):
         return []
 
