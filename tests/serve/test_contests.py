@@ -305,6 +305,27 @@ def test_ghosts_accompany_the_film_of_a_heat(console: RunningConsole, cars: list
     assert post("/api/contests/heats", json=settings | {"ghosts": ["best-lap"] * 17}).status_code == 422
 
 
+def test_a_track_that_was_drawn_anew_is_no_more_the_road_of_a_heat(
+    console: RunningConsole, cars: list[dict[str, str]]
+) -> None:
+    client = console.client
+    sketch = client.get("/api/tracks/oval/sketch").json()
+    assert client.put("/api/tracks/own", json=sketch).status_code == 200
+    heat = started(console, "heats", models=cars, track="own", seed=1, max_resets=0)
+
+    def is_as_it_was() -> bool:
+        (listed,) = (one for one in client.get("/api/contests").json() if one["id"] == heat["id"])
+        return bool(listed["is_road_as_it_was"])
+
+    assert (heat["state"], heat["is_road_as_it_was"], is_as_it_was()) == ("done", True, True)
+    for point in sketch["points"]:
+        point["width"] *= 1.1
+    assert client.put("/api/tracks/own?replace=true", json=sketch).status_code == 200
+    assert not is_as_it_was()
+    assert client.delete("/api/tracks/own").status_code == 204
+    assert not is_as_it_was()
+
+
 @pytest.fixture(scope="module")
 def evaluation(console: RunningConsole, cars: list[dict[str, str]]) -> dict[str, str]:
     """One of Ada's on the oval, as a ghost is asked for."""

@@ -285,6 +285,7 @@ class Contests:
             kind=payload["kind"],
             title=payload["title"],
             tracks=payload["tracks"],
+            is_road_as_it_was="digest" not in result or self._courses.is_still(payload["tracks"][0], result["digest"]),
             direction=payload.get("terms", {}).get("rules", payload).get("direction", "forward"),
             models=[entry_name(one) for one in payload["models"]],
             state=job.state,  # type: ignore[arg-type]

@@ -117,6 +117,8 @@ class ContestCard(Message):
     title: str
     tracks: list[str]
     """As they were asked for."""
+    is_road_as_it_was: bool
+    """Of a heat: whether its track has not been drawn anew since, as far as that is known."""
     direction: str
     """In which they are driven."""
     models: list[str]

@@ -84,6 +84,7 @@ def heat(task: Task) -> dict[str, Any]:
         sensors=entries[first].sensors,
     )
     return {
+        "digest": conditions.track.digest,
         "heat": [
             {
                 **{name: row[name] for name in ("place", "name", "score", "gap", "best", "laps", "resets")},
@@ -93,7 +94,7 @@ def heat(task: Task) -> dict[str, Any]:
                 "penalty": row["penalty_seconds"],
             }
             for row in rows
-        ]
+        ],
     }
 
 
