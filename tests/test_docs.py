@@ -65,7 +65,7 @@ def test_python_block(where: str, text: str, tmp_path: Path) -> None:
 def test_every_verb_is_documented() -> None:
     from typer.main import get_command
 
-    from racecraft.cli import every_verb
+    from racecraft.cli.entry import every_verb
 
     text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     for name in get_command(every_verb()).commands:  # type: ignore[attr-defined]

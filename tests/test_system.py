@@ -47,8 +47,8 @@ def test_every_verb_and_all_but_the_walls_load_without_posix() -> None:
     heavy = ("torch", "cuda", "casadi")  # libraries that ask the system themselves
     printed = elsewhere(
         f"""
-import racecraft.cli
-racecraft.cli.every_verb()
+import racecraft.cli.entry
+racecraft.cli.entry.every_verb()
 for found in pkgutil.walk_packages(racecraft.__path__, "racecraft."):
     name = found.name
     if any(word in name for word in {heavy!r}) or ".presets." in name or "migrations" in name or ".starters" in name:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.judging import league
 from racecraft.run import RunFolder
 

@@ -19,7 +19,8 @@ from packaging.requirements import Requirement
 from PIL import Image
 from typer.main import get_command
 
-from racecraft import cli, load_track
+from racecraft import load_track
+from racecraft.cli.entry import every_verb
 from racecraft.extras import EXTRAS, MODULES, not_installed
 from racecraft.track import save_route
 
@@ -185,7 +186,7 @@ def spellings(command: Any) -> dict[str, str]:
 
 
 def test_every_option_is_typed_somewhere() -> None:
-    root = get_command(cli.every_verb())  # type: ignore[attr-defined]
+    root = get_command(every_verb())  # type: ignore[attr-defined]
     called = spellings(root)
     typed = {
         (verb, called.get(word, word)) for verb, lines in COMMANDS.items() for line in lines for word in line.split()

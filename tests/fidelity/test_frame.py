@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.errors import ConfigError
 from racecraft.fidelity.frame import FrameFit, fit_frame, network_frame
 from racecraft.fidelity.likeness import edge_offsets, mean_difference, structural_similarity

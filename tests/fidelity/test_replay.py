@@ -427,7 +427,7 @@ def test_picture(lines, tmp_path):
 def test_the_verbs(lines, tmp_path, monkeypatch):
     from typer.testing import CliRunner
 
-    from racecraft.cli import every_verb
+    from racecraft.cli.entry import every_verb
 
     monkeypatch.chdir(tmp_path)
     path = str(write(tmp_path / "a.csv", lines))

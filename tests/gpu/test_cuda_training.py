@@ -9,7 +9,7 @@ import pytest
 from host_device import HostDevice
 from typer.testing import CliRunner
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.errors import ConfigError
 from racecraft.gpu import open_device
 from racecraft.learn import PPOConfig

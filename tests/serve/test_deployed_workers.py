@@ -10,7 +10,7 @@ import pytest
 import yaml
 from typer.main import get_command
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.serve.jobs.supervisor import GRACE
 
 DEPLOY = Path(__file__).parents[2] / "deploy"

@@ -14,7 +14,7 @@ from leagues import RunningLeague, ok, refused, running_league
 from sqlalchemy.orm import Session
 from typer.testing import CliRunner
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.race.entry_file import pack_entry
 from racecraft.replay import read_replay
 from racecraft.run import RunFolder

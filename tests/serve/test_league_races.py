@@ -404,7 +404,7 @@ def test_a_model_of_ones_own_garage_is_entered_like_any_other(cup: Cup, run: Run
 def test_the_command_line_enters_from_any_machine(cup: Cup, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from typer.testing import CliRunner
 
-    from racecraft.cli import every_verb
+    from racecraft.cli.entry import every_verb
 
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     token = ok(cup.bob.post("/api/account/tokens", json={}), 201)["secret"]
@@ -432,7 +432,7 @@ def test_when_it_is_over_anybody_can_check_it(
 ) -> None:
     from typer.testing import CliRunner
 
-    from racecraft.cli import every_verb
+    from racecraft.cli.entry import every_verb
     from racecraft.race.announcement import Announcement
     from racecraft.replay import read_replay, verify
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from racecraft.cli import every_verb
+from racecraft.cli.entry import every_verb
 from racecraft.errors import ConfigError
 from racecraft.learn import DistillConfig
 from racecraft.reward import load_reward

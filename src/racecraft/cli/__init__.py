@@ -11,14 +11,7 @@ from __future__ import annotations
 
 import sys
 
-TYPE_CHECKING = False  # without `typing`, see `racecraft`
-
-if TYPE_CHECKING:
-    from typing import Any
-
-    from racecraft.cli.entry import every_verb as every_verb
-
-__all__ = ["every_verb", "main"]
+__all__ = ["main"]
 
 
 def main() -> None:
@@ -28,12 +21,3 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)  # as of every later one
     entry.main()
-
-
-def __getattr__(name: str) -> Any:
-    """Import what is asked for beside `main` on first use."""
-    if name == "every_verb":
-        from racecraft.cli.entry import every_verb
-
-        return every_verb
-    raise AttributeError(f"module 'racecraft.cli' has no attribute {name!r}")
