@@ -27,6 +27,8 @@ def test_how_far_a_teacher_is_until_its_student_drives(tmp_path: Path) -> None:
         page = visit.open("/models/pupil")
         page.get_by_text("A teacher, told where everything is, learns first: ").wait_for()
         first = _told(visit)
+        pace = page.locator(".figures div", has=page.get_by_text("Steps per second")).locator("dd")
+        assert pace.inner_text() == "–", "of the cars that wait for it, which drive no steps"
         console.wait_for(lambda: _told(visit) > first)
         page.reload()
         page.get_by_text("of its lessons; the curve begins").wait_for()

@@ -11,3 +11,7 @@ export function lessonOf(last: Point | undefined, steps: number): number | null 
   if (typeof lesson !== "number" || last!.step < steps) return null; // iterations in quick succession are left out
   return Math.floor(100 * lesson + 1e-9) / 100; // all of it only at the end
 }
+
+/** Camera steps a second of an iteration; null of a teacher's, in which no camera looks, and where nobody knows. */
+export const paceOf = (point: Point | undefined): number | null =>
+  typeof point?.["pace"] === "number" && typeof point["lesson"] !== "number" ? point["pace"] : null;

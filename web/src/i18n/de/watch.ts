@@ -14,6 +14,7 @@ export const watch: Record<keyof typeof english, string> = {
   evidence_kl: "ein üblicher Lernschritt bewegt die Strategie um {now} nat; üblich sind 0,01 bis 0,05",
   evidence_forgot: "{best} nach {step} Schritten, {now} in der besten der letzten drei Auswertungen",
   next: "Wie weiter",
+  next_league: "In einem Rennen der Liga melden",
   next_race: "Gegen die Uhr auswerten",
   next_analysis: "Sehen, wo es die Straße verließ",
   next_reward: "Belohnung ändern und weitermachen",

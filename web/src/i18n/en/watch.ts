@@ -11,6 +11,7 @@ export const watch = {
   evidence_kl: "a usual update moves the policy by {now} nats; 0.01 to 0.05 is usual",
   evidence_forgot: "{best} at {step} steps, {now} in the best of the last three evaluations",
   next: "What next",
+  next_league: "Enter it in a race of the league",
   next_race: "Evaluate it against the clock",
   next_analysis: "See where it left the road",
   next_reward: "Change the reward and go on",
