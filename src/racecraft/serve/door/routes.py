@@ -62,7 +62,9 @@ def show_card(request: Request, body: ShowCard, response: Response, consoles: In
     user = consoles.keys.card_user(body.secret)
     if user is None:
         fail(request, consoles)
-        raise NotLetIn("This card is no longer good.", hint="Ask for a new one.")
+        raise NotLetIn(
+            "There is no such card, or it is no longer good.", hint="Look at it again, or ask for a new one."
+        )
     return let_in(request, response, consoles, user)
 
 
