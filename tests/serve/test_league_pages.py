@@ -243,11 +243,34 @@ def test_the_teacher_says_something_about_a_model_and_its_owner_reads_it(lesson:
     page.get_by_role("button", name="Remove: Brake before the hairpin.").wait_for()
     pupil = lesson.visits["Comet"].open("/league")
     pupil.get_by_text("Brake before the hairpin.").wait_for()
+    pupil.get_by_text("from who organises the group").wait_for()  # as long as the teacher has no name but "you"
     pupil.get_by_role("link", name="comet-one").click()
     said = pupil.get_by_role("region", name="What was said about it")
     said.get_by_text("Brake before the hairpin.").wait_for()
     said.get_by_role("button", name="Remove").click()
     said.wait_for(state="detached")
+
+
+def test_a_race_is_put_away_only_by_who_means_it_and_says_what_one_may(lesson: Lesson, race: int) -> None:
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    spare = ok(lesson.league.owner.post(f"/api/groups/{group}/races", json={"title": "Spare", "track": "oval"}), 201)[
+        "id"
+    ]
+    address = f"/api/league/races/{spare}"
+    ok(lesson.league.owner.patch(address, json={"attempts_per_day": 3}))
+    pupil = lesson.visits["Comet"].open(f"/league/{spare}")
+    pupil.get_by_text("3 entries a day").wait_for()
+    page = lesson.visits["teacher"].open(f"/league/{spare}")
+    page.get_by_role("button", name="Put away").click()
+    sure = page.get_by_role("alert")
+    sure.get_by_role("button", name="Cancel").click()
+    sure.wait_for(state="detached")
+    ok(lesson.league.owner.get(f"/api/boards/{spare}"))
+    lesson.visits["Comet"].open("/league")  # whose board would ask for what is no more
+    page.get_by_role("button", name="Put away").click()
+    sure.get_by_role("button", name="Put away").click()
+    page.get_by_text("The race is put away.").wait_for()
+    assert lesson.league.owner.get(f"/api/boards/{spare}").status_code == 404
 
 
 def test_a_code_at_the_wall_and_a_card_that_was_lost(lesson: Lesson, race: int) -> None:
@@ -378,6 +401,14 @@ def test_a_forgotten_password_and_the_log_that_tells_of_it(lesson: Lesson, race:
     assert rows.inner_text().split("\t")[1:3] == ["Comet", "reset_password"]
     page.get_by_label("Who").fill("nobody like that")
     page.get_by_text("nothing like that").wait_for()
+
+
+def test_who_holds_the_league_gives_themselves_a_name(lesson: Lesson, race: int) -> None:
+    page = lesson.visits["teacher"].open("/league")
+    page.get_by_label("What are you called here?").fill("Ms Frizzle")
+    page.get_by_role("button", name="Save").click()
+    page.get_by_label("What are you called here?").wait_for(state="detached")
+    assert ok(lesson.league.owner.get("/api/account"))["name"] == "Ms Frizzle"
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,15 @@
+import { expect, test } from "vitest";
+import { authorOf, isUnnamed } from "./names";
+
+test("nobody reads that they wrote themselves what their teacher said", () => {
+  expect(authorOf({ author: "you", is_mine: true })).toBe("you");
+  expect(authorOf({ author: "you", is_mine: false })).toBe("from who organises the group");
+  expect(authorOf({ author: "Ms Frizzle", is_mine: false })).toBe("Ms Frizzle");
+});
+
+test("who holds the league is asked for a name, and nobody else", () => {
+  expect(isUnnamed({ name: "you", role: "admin" })).toBe(true);
+  expect(
+    [{ name: "Ms Frizzle", role: "admin" } as const, { name: "you", role: "racer" } as const, null].map(isUnnamed),
+  ).toEqual([false, false, false]);
+});
