@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from racecraft.errors import RacecraftError, RewardError, RunError
 from racecraft.run import RunFolder
+from racecraft.run.folder import checked_name as checked_run
+from racecraft.serve.people.names import checked_name
 
 
 @pytest.mark.parametrize("kind", [RacecraftError, RewardError])
@@ -25,3 +28,14 @@ def test_a_strangers_run_writes_no_escape_sequence(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="unexpected keyword") as error:
         RunFolder.open(tmp_path).read_info()
     assert str(error.value).isprintable()
+
+
+@pytest.mark.parametrize("check", [checked_run, checked_name])
+def test_a_name_of_a_joined_emoji_is_shown_without_codes(check: Callable[[str], str]) -> None:
+    with pytest.raises(RacecraftError, match="'👨👩👧'"):
+        check("👨\u200d👩\u200d👧")
+
+
+def test_a_joiner_that_joins_nothing_is_shown_as_what_it_is() -> None:
+    with pytest.raises(RunError, match=r"'ad\\u200da'"):
+        checked_run("ad\u200da")

@@ -6,12 +6,16 @@ The command line prints ``str(error)`` and, where there is one, ``hint``; it nev
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from itertools import islice
 from typing import Any, Final
 
 MOST_CHARACTERS: Final = 80  # characters of a name, and MOST_NAMES of these, that a suggestion is looked for among
 MOST_NAMES: Final = 500
+
+
+_JOINED: Final = re.compile(r"(?<=[^\x00-\x7f])\u200d(?=[^\x00-\x7f])")  # elsewhere it may be what is wrong
 
 
 class RacecraftError(Exception):
@@ -141,3 +145,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     short = (one for one in known if len(one) <= MOST_CHARACTERS)
     close = difflib.get_close_matches(name, list(islice(short, MOST_NAMES)), n=1, cutoff=0.5)
     return f"Did you mean '{close[0]}'?" if close else ""
+
+
+def quoted(name: str) -> str:
+    """Somebody's name for a message, in quotes; of an emoji that is joined of several, these, without codes."""
+    return repr(_JOINED.sub("", name))

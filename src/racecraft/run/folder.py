@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.errors import ConfigError, RunError, did_you_mean, quoted
 from racecraft.json_file import read_json_object, read_text
 from racecraft.moved import place_of
 from racecraft.run.atomic import write_file, write_json
@@ -405,7 +405,7 @@ def checked_name(name: str) -> str:
     """
     if len(name) > MAX_NAME or not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.endswith("."):
         raise RunError(
-            f"Name {name!r} is not allowed: 1 to {MAX_NAME} letters, digits, dots, hyphens and underscores.",
+            f"Name {quoted(name)} is not allowed: 1 to {MAX_NAME} letters, digits, dots, hyphens and underscores.",
             hint=f"Use '{sanitize_name(name)}'.",
         )
     return name

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 from typing import Final
 
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, quoted
 from racecraft.serve.naming import plain_text
 
 MAX_NAME: Final = 32
@@ -19,12 +19,12 @@ def checked_name(name: str) -> str:
     Raises:
         ConfigError: It is empty, too long, mixes scripts, or is no plain text (`racecraft.serve.naming`).
     """
-    shown = plain_text(name)
+    shown, told = plain_text(name), quoted(name[:40])
     scripts = {unicodedata.name(sign, "").split(" ")[0] for sign in shown if sign.isalpha()}
     if len(scripts.intersection(ALIKE)) > 1:
-        raise ConfigError(f"A name has letters of one script; {name[:40]!r} has some that are taken for others.")
+        raise ConfigError(f"A name has letters of one script; {told} has some that are taken for others.")
     if not 1 <= len(shown) <= MAX_NAME or not any(sign.isalnum() for sign in shown):
-        raise ConfigError(f"A name has 1 to {MAX_NAME} letters, digits and ordinary signs; {name[:40]!r} is none.")
+        raise ConfigError(f"A name has 1 to {MAX_NAME} letters, digits and ordinary signs; {told} is none.")
     return shown
 
 
