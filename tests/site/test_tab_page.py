@@ -294,10 +294,17 @@ def write(page: Page, source: str) -> None:
 
 
 def reloaded(page: Page) -> Worker:
-    """The worker of the page's cars, which begins anew: one of before ends with its page, and never answers."""
+    """The worker of the page's cars, which begins anew.
+
+    From an empty page, as a reload may hear of a worker of the page before: one that ends with it, and never answers.
+    """
+    from playwright.sync_api import expect
+
+    address = page.url
+    page.goto("about:blank")
     with page.expect_worker() as first:  # the others are its helpers, who hear of nothing
-        page.reload()
-    page.get_by_role("button", name="Train", exact=True).wait_for()
+        page.goto(address)
+    expect(page.get_by_role("button", name="Train", exact=True)).to_be_enabled()
     return first.value
 
 
