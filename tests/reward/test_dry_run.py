@@ -112,8 +112,31 @@ def test_only_a_start_is_near_the_start(name):
     assert 0.0 < column(first, "progress") < 0.02
     for situation in others:
         assert 0.1 <= column(situation, "progress") <= 1.0, situation.name
-        is_done = column(situation, "progress") > 0.99
+        is_done = column(situation, "progress") == 1.0
         assert is_done == (column(situation, "lap") == 1.0) == (situation.name == "finish")
+
+
+@pytest.mark.parametrize("name", ["reinvent_2018", "oval", "straight", "generated:3"])
+def test_before_the_line_the_next_waypoint_is_the_last_one(name):
+    track = load_track(name)
+    (row,) = [situation.row for situation in situations(track) if situation.name == "before the line"]
+    values = dict(zip(ROW_COLUMNS, row, strict=True))
+    assert values["closest_next"] == len(track.waypoints) - 1
+    assert 0.0 < track.length - values["projection_distance"] < 0.051
+    assert values["progress"] < 1.0
+    assert STATUS_NAMES[int(values["status"])] == "in_progress"
+
+
+@pytest.mark.parametrize("ahead", [1, 2])
+def test_looking_beyond_the_last_waypoint_is_found(ahead):
+    source = f"""
+def reward_function(params):
+    x, y = params["waypoints"][params["closest_waypoints"][1] + {ahead}]
+    return 1.0
+"""
+    failed = [outcome for outcome in dry_run(source, load_track("reinvent_2018")) if outcome.error is not None]
+    assert [outcome.situation.name for outcome in failed] == ["before the line"]
+    assert "IndexError" in str(failed[0].error)
 
 
 @pytest.mark.parametrize("reward", ["1.0 / params['progress']", "math.log(params['progress'])"])

@@ -31,6 +31,7 @@ TYPICAL_SPEED = 1.5  # m/s
 HALF_CAR = 0.08  # m from the car's middle line to its wheels
 HALF_VIEW = math.radians(60.0)  # of the camera, to each side
 MOST_TRACKS = 32  # of several that are tried
+BEFORE_LINE = 0.05  # m at most that the last place of a lap is before its end
 NEAR = 0.6  # m from an object's middle to the point that x and y mean
 _X, _Y, _HEADING, _OFFSET, _DISTANCE = (
     OBJECT_COLUMNS.index(f"object_{name}") for name in ("x", "y", "heading", "offset", "distance")
@@ -172,6 +173,8 @@ def _situations(track: Track) -> list[Situation]:
     straight = float(places[np.abs(curvature).argmin()])
     left, right = float(places[curvature.argmax()]), float(places[curvature.argmin()])
     half = 0.5 * float(track.width_at(straight))
+    # Between the last two waypoints, beyond which a function that looks ahead finds none.
+    before_line = track.length - min(BEFORE_LINE, 0.5 * float(track.length - track.arc_length[-2]))
     other_way = track.reversed()
     return [
         Situation(
@@ -226,6 +229,11 @@ def _situations(track: Track) -> list[Situation]:
             "on pace",
             "After exactly 100 steps, two thirds of the lap done.",
             moment(track, track.length * 2 / 3, steps=100, progress=2 / 3),
+        ),
+        Situation(
+            "before the line",
+            "On the last stretch of the lap, just before the finish line.",
+            moment(track, before_line, steps=195),
         ),
         Situation(
             "finish",

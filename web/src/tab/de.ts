@@ -121,6 +121,7 @@ export const de: Record<TabKey, string> = {
   situation_on_pace: "gut in der Zeit",
   situation_near_an_object: "vor einem Hindernis",
   situation_crash: "Zusammenstoß",
+  situation_before_the_line: "kurz vor dem Ziel",
   situation_finish: "Ziel",
   replays: "Ein Replay prüfen",
   replays_lead:

@@ -113,6 +113,7 @@ export const en = {
   situation_on_pace: "on pace",
   situation_near_an_object: "near an object",
   situation_crash: "crash",
+  situation_before_the_line: "before the line",
   situation_finish: "finish",
   replays: "Check a replay",
   replays_lead:

@@ -12,6 +12,7 @@ export interface Words {
 export const STEP = 1 / 15; // s between two calls for the same car
 export const SPEED = 1.5; // m/s
 export const HALF_CAR = 0.08; // m from the car's middle line to its wheels
+const BEFORE_LINE = 0.05; // m at most that the last place of a lap is before its end
 const FRONT = 0.14; // m from the car's origin to the point that x, y and progress mean
 
 export interface Moment {
@@ -67,6 +68,7 @@ export function momentsOf(track: TrackFile, words: Words): TrackFile["situations
   );
   const [left, right] = [first((a, b) => a > b), first((a, b) => a < b)];
   const half = road.widthAt(straight) / 2;
+  const beforeLine = length - Math.min(BEFORE_LINE, (length - road.arc.at(-2)!) / 2); // between the last two waypoints
   const degrees = Math.PI / 180;
   const told: [string, Float64Array][] = [
     ["start", on(FRONT, { steps: 2, progress: FRONT / length })],
@@ -82,6 +84,7 @@ export function momentsOf(track: TrackFile, words: Words): TrackFile["situations
     ["off track", on(straight, { steps: 95, offset: -(half + 0.2), isOnTrack: false, status: "off_track" })],
     ["other way", back(length - straight, { steps: 40 })],
     ["on pace", on((length * 2) / 3, { steps: 100, progress: 2 / 3 })],
+    ["before the line", on(beforeLine, { steps: 195 })],
     ["finish", on(length, { steps: 200, progress: 1, status: "lap_complete" })],
   ];
   return told.map(([name, row]) => ({ name, description: name, row: [...row] }));

@@ -68,5 +68,6 @@ export const presets: Record<keyof typeof english, string> = {
   situation_on_pace: "Nach genau 100 Schritten, zwei Drittel der Runde geschafft.",
   situation_near_an_object: "Geradewegs auf ein Hindernis zu.",
   situation_crash: "In ein Hindernis, Ende der Episode.",
+  situation_before_the_line: "Auf dem letzten Stück der Runde, kurz vor der Ziellinie.",
   situation_finish: "Die Runde ist geschafft.",
 };

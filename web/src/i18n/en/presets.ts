@@ -62,5 +62,6 @@ export const presets = {
   situation_on_pace: "After exactly 100 steps, two thirds of the lap done.",
   situation_near_an_object: "Straight towards an object.",
   situation_crash: "Into an object, end of the episode.",
+  situation_before_the_line: "On the last stretch of the lap, just before the finish line.",
   situation_finish: "The lap is complete.",
 } as const;
