@@ -14,6 +14,7 @@ from PIL import Image
 
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.analysis.share import draw_share, share, write_share
+from racecraft.analysis.share_heat import Placed, draw_heat, share_heat
 from racecraft.analysis.share_picture import finish_picture
 from racecraft.errors import ReplayError, RunError
 from racecraft.film.racing_line import draw_racing_line
@@ -168,3 +169,15 @@ def test_what_cannot_be_shared_is_told(run: RunFolder, stamp: str, tmp_path: Pat
     write_json(tmp_path / "new" / "run.json", json.loads((run.path / "run.json").read_text()))
     with pytest.raises(RunError, match="no evaluation to share"):
         write_share(tmp_path / "new")
+
+
+def test_a_heat_whose_file_lacks_a_car_is_told_in_a_sentence(run: RunFolder, stamp: str, tmp_path: Path) -> None:
+    file = run.path / f"evaluation-{stamp}" / "evaluation.replay"
+    count = len(read_replay(file).cars)
+    rows = [Placed(car=car, name=f"car {car}", place=car + 1, score=None, best_lap=None, gap=None) for car in (0, count)]
+    assert "car 0" in share_heat(file, rows[:1], title="A heat")
+    with pytest.raises(ReplayError, match="does not have all cars of the heat"):
+        share_heat(file, rows, title="A heat")
+    with pytest.raises(ReplayError, match="does not have all cars of the heat"):
+        draw_heat(file, rows, tmp_path / "heat.png", title="A heat")
+    assert not (tmp_path / "heat.png").exists()

@@ -13,6 +13,7 @@ from pathlib import Path
 from racecraft.analysis.report_page import page, section
 from racecraft.analysis.share_page import LANGUAGES, Shown, line_of, number, proof, script, stage, words_of
 from racecraft.analysis.share_picture import draw_line, finish_picture
+from racecraft.errors import ReplayError
 from racecraft.race.recording import Recording
 from racecraft.replay.replay import MAX_CELLS, read_replay
 from racecraft.track.picture import describe
@@ -49,7 +50,7 @@ def share_heat(
         max_numbers: As for `read_replay`.
 
     Raises:
-        ReplayError: The file cannot be read.
+        ReplayError: The file cannot be read, or lacks a car of the result.
     """
     words, drives = words_of(language), _drives(file, rows, max_numbers)
     road, _ = describe(drives[0].track)
@@ -82,7 +83,7 @@ def draw_heat(
     """The winner's racing line and the result as a picture, with the replay file inside; otherwise as `share_heat`.
 
     Raises:
-        RacecraftError: The file cannot be read, or the picture not written.
+        RacecraftError: The file cannot be read, or lacks a car of the result, or the picture cannot be written.
     """
     words, drives = words_of(language), _drives(file, rows, max_numbers)
     figures = [(what.upper(), value) for what, value in _figures(rows[0], words)]
@@ -93,6 +94,8 @@ def draw_heat(
 
 def _drives(file: Path, rows: Sequence[Placed], max_numbers: int) -> list[Recording]:
     cars = read_replay(file, max_numbers=max_numbers).cars
+    if any(row.car >= len(cars) for row in rows):
+        raise ReplayError(f"{file.name} does not have all cars of the heat.")
     return [cars[row.car].recording for row in rows]
 
 
