@@ -174,7 +174,9 @@ def test_what_cannot_be_shared_is_told(run: RunFolder, stamp: str, tmp_path: Pat
 def test_a_heat_whose_file_lacks_a_car_is_told_in_a_sentence(run: RunFolder, stamp: str, tmp_path: Path) -> None:
     file = run.path / f"evaluation-{stamp}" / "evaluation.replay"
     count = len(read_replay(file).cars)
-    rows = [Placed(car=car, name=f"car {car}", place=car + 1, score=None, best_lap=None, gap=None) for car in (0, count)]
+    rows = [
+        Placed(car=car, name=f"car {car}", place=car + 1, score=None, best_lap=None, gap=None) for car in (0, count)
+    ]
     assert "car 0" in share_heat(file, rows[:1], title="A heat")
     with pytest.raises(ReplayError, match="does not have all cars of the heat"):
         share_heat(file, rows, title="A heat")
