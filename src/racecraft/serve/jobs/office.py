@@ -15,6 +15,10 @@ from racecraft.errors import RunError
 from racecraft.serve.store.tables import Job
 
 Slot = Literal["training", "other"]
+MAX_CODE: Final = 64
+"""Characters of what kind of error ended a job, where a console is told through its server."""
+MAX_TOLD: Final = 4000
+"""Characters of such an error's message, and of its hint."""
 
 
 @dataclass(frozen=True)

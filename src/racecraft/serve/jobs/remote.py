@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from racecraft.errors import RunError
 from racecraft.serve.jobs.line import MAX_OBJECT, Line, Refused
-from racecraft.serve.jobs.office import Answer, OfficeAway, Slot
+from racecraft.serve.jobs.office import MAX_CODE, MAX_TOLD, Answer, OfficeAway, Slot
 from racecraft.serve.jobs.parcel import HEAD, MAX_PARCEL, pack
 from racecraft.serve.store.objects import Content, NoObject
 from racecraft.serve.store.tables import Job
@@ -79,6 +79,7 @@ class RemoteOffice:
         error: Mapping[str, Any] | None = None,
     ) -> bool:
         """End a job that this owner holds; False when it is another's now."""
+        error = None if error is None else _shortened(error)
         told = {"job": job_id, "state": state, "result": result, "error": error}
         return self._tell(f"{ROOM}/{owner}/finish", told)
 
@@ -166,6 +167,13 @@ class RemoteObjects:
     def below(self, key: str) -> list[str]:
         """As `beside`."""
         return self.beside(key)
+
+
+def _shortened(error: Mapping[str, Any]) -> dict[str, Any]:
+    """An error as the server takes it: refused for its length it would be no failure, but a job to be begun again."""
+    bounds = {"code": MAX_CODE, "message": MAX_TOLD, "hint": MAX_TOLD}
+    cut = {key: error[key][: most - 1] + "…" for key, most in bounds.items() if len(error.get(key, "")) > most}
+    return {**error, **cut}
 
 
 def _job(told: Any) -> Job | None:

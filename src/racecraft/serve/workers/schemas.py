@@ -6,11 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from racecraft.serve.jobs.office import Slot
+from racecraft.serve.jobs.office import MAX_CODE, MAX_TOLD, Slot
 from racecraft.serve.schemas import Message
 from racecraft.serve.settings import MAX_MACHINE
 
-Text = Annotated[str, Field(max_length=4000)]
+Text = Annotated[str, Field(max_length=MAX_TOLD)]
 
 
 class Welcome(Message):
@@ -67,7 +67,7 @@ class BeatAnswer(Message):
 class JobError(Message):
     """Why a job failed."""
 
-    code: str = Field(max_length=64)
+    code: str = Field(max_length=MAX_CODE)
     message: Text
     hint: Text = ""
     line: int | None = None
