@@ -12,7 +12,7 @@ from leagues import untrained_run
 
 from racecraft.race.entry_file import pack_entry
 from racecraft.replay.replay import read_replay
-from racecraft.serve.people.people import People
+from racecraft.serve.people.people import People, add_person
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.tables import Member
@@ -76,3 +76,13 @@ def test_an_entry_that_was_given_a_name_keeps_it_on_the_board_and_in_its_replay(
     task = court.claim()
     court.end(task, "done", result=tasks.judge(task))
     assert names() == ("polite", ["polite, trial 1", "polite, trial 2"])
+
+
+@pytest.mark.parametrize("name", ["you", "You", "Ｙou!"])
+def test_nobody_is_called_as_pages_know_who_has_no_name_yet(court: Court, name: str) -> None:
+    people = People(court.database)
+    people.rename(TEACHER, "Ms Frizzle")
+    with pytest.raises(Conflict, match="looks like one that is"):
+        people.rename(ADA, name)
+    with pytest.raises(Conflict, match="looks like one that is"), court.database.transaction() as session:
+        add_person(session, name)

@@ -2,6 +2,7 @@
 import { ask } from "../api/client";
 import type { RaceReplay } from "../api/races";
 import type { components } from "../api/schema";
+import { carsShown, nameShown, namesShown } from "./names";
 import type { Me } from "./who.svelte";
 
 type Schemas = components["schemas"];
@@ -36,6 +37,9 @@ export type UsageInfo = Schemas["UsageInfo"];
 export type ProviderLink = Schemas["ProviderLink"];
 export type TokenInfo = Schemas["TokenInfo"];
 
+const finalistsShown = (page: FinalPage): FinalPage => ({ ...page, finalists: namesShown(page.finalists) });
+
+/** Who has no name yet is called so in all that is read here, but on their own card. */
 export const leagueApi = {
   signIn: (name: string, password: string) => ask<Me>("POST", "/door/sign-in", { name, password }),
   showCard: (secret: string) => ask<Me>("POST", "/door/card", { secret }),
@@ -55,7 +59,8 @@ export const leagueApi = {
   joinOn: (code: string) => ask<GroupCard>("POST", "/groups/join", { code }),
 
   groups: () => ask<GroupCard[]>("GET", "/groups"),
-  group: (id: number) => ask<GroupDetail>("GET", `/groups/${id}`),
+  group: (id: number) =>
+    ask<GroupDetail>("GET", `/groups/${id}`).then((found) => ({ ...found, members: namesShown(found.members) })),
   makeGroup: (title: string) => ask<GroupCard>("POST", "/groups", { title }),
   open: (id: number, uses: number, hours: number) => ask<JoiningInfo>("POST", `/groups/${id}/joining`, { uses, hours }),
   close: (id: number) => ask<void>("DELETE", `/groups/${id}/joining`),
@@ -70,8 +75,8 @@ export const leagueApi = {
   quota: () => ask<OwnQuota>("GET", "/quota"),
   groupQuota: (id: number) => ask<GroupQuota>("GET", `/groups/${id}/quota`),
   setGroupQuota: (id: number, each: QuotaInfo) => ask<void>("PUT", `/groups/${id}/quota`, each),
-  lessons: (id: number) => ask<Schemas["MemberLessons"][]>("GET", `/groups/${id}/lessons`),
-  models: (id: number) => ask<MemberModels[]>("GET", `/groups/${id}/models`),
+  lessons: (id: number) => ask<Schemas["MemberLessons"][]>("GET", `/groups/${id}/lessons`).then(namesShown),
+  models: (id: number) => ask<MemberModels[]>("GET", `/groups/${id}/models`).then(namesShown),
   copy: (id: number, member: number, model: string) =>
     ask<Schemas["ModelCard"]>("POST", `/groups/${id}/models/copy`, { member, model }),
   comments: () => ask<CommentInfo[]>("GET", "/comments"),
@@ -88,21 +93,24 @@ export const leagueApi = {
     ask<LeagueRace>("PATCH", `/league/races/${id}`, change),
   follow: (id: number, race: number, best: number) =>
     ask<LeagueRace>("POST", `/league/races/${id}/follow`, { race, best }),
-  final: (id: number) => ask<FinalPage>("GET", `/boards/${id}/final`),
-  hold: (id: number) => ask<FinalPage>("POST", `/league/races/${id}/hold`),
+  final: (id: number) => ask<FinalPage>("GET", `/boards/${id}/final`).then(finalistsShown),
+  hold: (id: number) => ask<FinalPage>("POST", `/league/races/${id}/hold`).then(finalistsShown),
   duelFilm: (id: number, duel: number, heat: number) =>
-    ask<RaceReplay>("GET", `/boards/${id}/duels/${duel}/heats/${heat}/film`),
-  season: (group: number) => ask<SeasonRow[]>("GET", `/groups/${group}/season`),
+    ask<RaceReplay>("GET", `/boards/${id}/duels/${duel}/heats/${heat}/film`).then(carsShown),
+  season: (group: number) => ask<SeasonRow[]>("GET", `/groups/${group}/season`).then(namesShown),
   judgeAgain: (id: number, submission: number) =>
     ask<unknown>("POST", `/league/races/${id}/submissions/${submission}/judge`),
   removeRace: (id: number) => ask<void>("DELETE", `/league/races/${id}`),
-  boardSeason: (id: number) => ask<SeasonRow[]>("GET", `/boards/${id}/season`),
-  board: (id: number, top: number) => ask<BoardPage>("GET", `/boards/${id}?top=${top}`),
+  boardSeason: (id: number) => ask<SeasonRow[]>("GET", `/boards/${id}/season`).then(namesShown),
+  board: (id: number, top: number) =>
+    ask<BoardPage>("GET", `/boards/${id}?top=${top}`).then((page) => ({ ...page, rows: namesShown(page.rows) })),
   film: (id: number, submissions: number[]) =>
-    ask<RaceReplay>("GET", `/boards/${id}/film?submissions=${submissions.join(",")}`),
+    ask<RaceReplay>("GET", `/boards/${id}/film?submissions=${submissions.join(",")}`).then(carsShown),
   enter: (id: number, model: string) => ask<SubmissionInfo>("POST", `/league/races/${id}/enter`, { model }),
   submissions: (id: number, everybody: boolean) =>
-    ask<SubmissionInfo[]>("GET", `/league/races/${id}/submissions?everybody=${everybody}`),
+    ask<SubmissionInfo[]>("GET", `/league/races/${id}/submissions?everybody=${everybody}`).then((found) =>
+      namesShown(found).map((one) => ({ ...one, like: one.like && { ...one.like, name: nameShown(one.like.name) } })),
+    ),
   renameModel: (id: number, submission: number, model: string) =>
     ask<void>("PATCH", `/league/races/${id}/submissions/${submission}`, { model }),
   disqualify: (id: number, submission: number, reason: string) =>

@@ -62,6 +62,7 @@ export const de: Record<LeagueKey, string> = {
   audit_newest: "Zu den neuesten",
   league: "Liga",
   league_lead: "Deine Gruppen und die Rennen zwischen euch.",
+  unnamed: "noch ohne Namen",
   unnamed_lead: "Andere lesen „{name}“, wo du schreibst oder fährst, und das sagt ihnen nichts.",
   groups: "Gruppen",
   groups_none: "Du bist noch in keiner Gruppe.",

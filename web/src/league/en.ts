@@ -58,6 +58,7 @@ export const en = {
   audit_newest: "To the latest",
   league: "League",
   league_lead: "Your groups, and the races between you.",
+  unnamed: "no name yet",
   unnamed_lead: "Others read “{name}” where you write or race, which tells them nothing.",
   groups: "Groups",
   groups_none: "You are in no group yet.",

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { authorOf, isUnnamed } from "./names";
+import { authorOf, carsShown, isUnnamed, namesShown } from "./names";
 
 test("nobody reads that they wrote themselves what their teacher said", () => {
   expect(authorOf({ author: "you", is_mine: true })).toBe("you");
@@ -12,4 +12,29 @@ test("who holds the league is asked for a name, and nobody else", () => {
   expect(
     [{ name: "Ms Frizzle", role: "admin" } as const, { name: "you", role: "racer" } as const, null].map(isUnnamed),
   ).toEqual([false, false, false]);
+});
+
+test("nobody reads “you” where somebody stands who has no name yet", () => {
+  const rows = namesShown([
+    { name: "you", place: 1 },
+    { name: "Comet", place: 2 },
+  ]);
+  expect(rows).toEqual([
+    { name: "no name yet", place: 1 },
+    { name: "Comet", place: 2 },
+  ]);
+  const film = carsShown({
+    trial: 2,
+    cars: [
+      { model: "you", laps: [7] },
+      { model: "Comet", laps: [] },
+    ],
+  });
+  expect(film).toEqual({
+    trial: 2,
+    cars: [
+      { model: "no name yet", laps: [7] },
+      { model: "Comet", laps: [] },
+    ],
+  });
 });

@@ -5,6 +5,19 @@ import type { Me } from "./who.svelte";
 
 const UNNAMED = "you"; // whose console it was before it became a league
 
+/** What others read where somebody stands by name, on a board say. */
+export const nameShown = (name: string): string => (name === UNNAMED ? l("unnamed") : name);
+
+/** The same of all in a list. */
+export const namesShown = <T extends { name: string }>(people: T[]): T[] =>
+  people.map((one) => ({ ...one, name: nameShown(one.name) }));
+
+/** The same of the cars of a film, which are called by who entered them. */
+export const carsShown = <T extends { cars: { model: string }[] }>(film: T): T => ({
+  ...film,
+  cars: film.cars.map((car) => ({ ...car, model: nameShown(car.model) })),
+});
+
 /** Whether somebody holds the league under no name of their own. */
 export const isUnnamed = (me: Pick<Me, "name" | "role"> | null | undefined): boolean =>
   me?.role === "admin" && me.name === UNNAMED;

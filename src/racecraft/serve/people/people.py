@@ -14,7 +14,7 @@ from racecraft.serve.people.names import checked_name, handle_of
 from racecraft.serve.people.passwords import hash_password, is_password
 from racecraft.serve.problems import Conflict, NotFound, NotLetIn
 from racecraft.serve.settings import OWNER
-from racecraft.serve.store.database import Database
+from racecraft.serve.store.database import LOCAL_USER, Database
 from racecraft.serve.store.tables import (
     Card,
     Comment,
@@ -199,10 +199,16 @@ def use_invitation(session: Session, code: str) -> Invitation | None:
 
 
 def _flush(session: Session, name: str) -> None:
+    if handle_of(name) == LOCAL_USER:  # by which the pages know who has no name yet
+        raise _taken(name)
     try:
         session.flush()
     except IntegrityError as error:
-        raise Conflict(f"The name {name!r} is taken, or looks like one that is.", hint="Choose another.") from error
+        raise _taken(name) from error
+
+
+def _taken(name: str) -> Conflict:
+    return Conflict(f"The name {name!r} is taken, or looks like one that is.", hint="Choose another.")
 
 
 def _person(user: User) -> Person:
