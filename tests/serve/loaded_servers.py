@@ -1,5 +1,7 @@
 """Servers and workers that need not load what they consist of: forks of a process that has, one for a process of tests.
 
+It also forks those that do their jobs: `loaded_jobs.py`.
+
 A server's start is 1.3 s of CPU, 1.15 of it imports; a worker's 0.9. What is forked here is a process like any other,
 with its own id, folder, environment and files, killed and ended as one; only what `/proc` says of its command and its
 environment is its parent's.
@@ -17,10 +19,14 @@ import socket
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TextIO
+
+from forked_processes import LONGEST, ForkedProcess
+from loaded_jobs import do_jobs, fork_jobs
 
 CAN_FORK = sys.platform == "linux"
 _PARTS = (
@@ -34,43 +40,17 @@ _PARTS = (
     "uvicorn.protocols.websockets.auto",
 )
 """What a server has imported once it answers."""
-_LONGEST = 1 << 20  # bytes of a message: a server's words, folder and environment
 
 
-class Forked:
-    """A server's process, with what of `subprocess.Popen` its tests use."""
+class Forked(ForkedProcess):
+    """A server's process."""
 
     def __init__(self, words: Sequence[str], environment: Mapping[str, str]) -> None:
-        told = json.dumps({"words": words, "folder": os.getcwd(), "environment": dict(environment)})
+        told = {"words": words, "folder": os.getcwd(), "environment": dict(environment)}
         reading, writing = os.pipe()
-        socket.send_fds(_nursery(), [told.encode()], [writing, 2])
+        super().__init__(_nursery(), told, writing, 2)
         os.close(writing)
-        answer, (self._life,), _, _ = socket.recv_fds(_nursery(), _LONGEST, 1)
-        self.pid = int(answer)
         self.stdout: TextIO = os.fdopen(reading)
-
-    def _has_ended_within(self, seconds: float | None) -> bool:
-        if self._life != -1 and select.select([self._life], [], [], seconds)[0]:
-            os.close(self._life)
-            self._life = -1
-        return self._life == -1
-
-    def poll(self) -> int | None:
-        """None while it runs."""
-        return 0 if self._has_ended_within(0) else None
-
-    def wait(self, timeout: float | None = None) -> None:
-        """Until it has ended."""
-        if not self._has_ended_within(timeout):
-            raise subprocess.TimeoutExpired("racecraft", timeout or 0.0)
-
-    def terminate(self) -> None:
-        """Ask it to stop."""
-        os.kill(self.pid, signal.SIGTERM)
-
-    def kill(self) -> None:
-        """Stop it."""
-        os.kill(self.pid, signal.SIGKILL)
 
 
 def typed(*words: str, **shared: str) -> subprocess.Popen[str]:
@@ -110,6 +90,9 @@ def _load() -> None:
         every_verb()
         for module in _PARTS:
             import_module(module)
+        from racecraft.serve.jobs import worker
+
+        worker.load()
 
 
 def _bury(*_: Any) -> None:
@@ -121,17 +104,19 @@ def _bury(*_: Any) -> None:
             return
 
 
-def _nurse(tests: socket.socket) -> dict[str, Any] | None:
-    """Fork a server for each message; comes back in each of them with what it was told, and with None at the end."""
+def _nurse(tests: socket.socket, servers: socket.socket) -> tuple[dict[str, Any], list[int]] | None:
+    """Fork a process for each message; comes back in each with what it was told and given, and with None at the end."""
     while True:
-        message, files, _, _ = socket.recv_fds(tests, _LONGEST, 2)
+        asking = tests if tests in select.select([tests, servers], [], [])[0] else servers
+        message, files, _, _ = socket.recv_fds(asking, LONGEST, 5)
         if not message:
             return None
         signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGCHLD])  # or its id may be another's before it is looked up
         if child := os.fork():
             life = os.pidfd_open(child)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
-            socket.send_fds(tests, [str(child).encode()], [life])
+            with socket.socket(fileno=files.pop(0)) as answer, suppress(OSError):  # a server may be killed meanwhile
+                socket.send_fds(answer, [str(child).encode()], [life])
             for file in (life, *files):
                 os.close(file)
             continue
@@ -139,30 +124,39 @@ def _nurse(tests: socket.socket) -> dict[str, Any] | None:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGCHLD])
         tests.close()
-        for file, place in zip(files, (1, 2), strict=True):
-            os.dup2(file, place)
-            os.close(file)
-        told: dict[str, Any] = json.loads(message)
-        return told
+        servers.close()
+        os.close(files.pop(0))
+        return json.loads(message), files
 
 
-def _main() -> None:
+def _main() -> int | None:
     _load()
     gc.freeze()  # or every server that looks for garbage gets pages of its own
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the tests, with which this ends
     signal.signal(signal.SIGCHLD, _bury)
-    told = _nurse(socket.socket(fileno=int(sys.argv[1])))
-    if told is None:
-        return
+    heard, way = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    asked = _nurse(socket.socket(fileno=int(sys.argv[1])), heard)
+    if asked is None:
+        return None
+    told, files = asked
     os.environ.clear()
     os.environ.update(told["environment"])
     os.chdir(told["folder"])
+    if "runs" in told:
+        way.close()
+        del sys.path[0]
+        return do_jobs(told["runs"], files)
+    for file, place in zip(files, (1, 2), strict=True):
+        os.dup2(file, place)
+        os.close(file)
+    fork_jobs(way)
     from racecraft import __main__ as command
 
     sys.path[0] = told["folder"]
     sys.argv = [str(Path(command.__file__)), *told["words"]]
     command.main()
+    return None
 
 
 if __name__ == "__main__":
-    _main()
+    sys.exit(_main())

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from loaded_jobs import name_of
 from loaded_servers import Forked, started, typed
 from running_consoles import end
 
@@ -53,10 +54,13 @@ def running_worker(
 
 def processes_on(runs: Path) -> list[int]:
     """The processes that do jobs in a folder of runs."""
-    found = []
+    found, forked = [], name_of(runs)
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
-            command = (entry / "cmdline").read_bytes().split(b"\0") if entry.name.isdigit() else []
-            if b"racecraft.serve.jobs" in command and os.fsencode(runs) in command:
+            if not entry.name.isdigit():
+                continue
+            command = (entry / "cmdline").read_bytes().split(b"\0")
+            is_typed = b"racecraft.serve.jobs" in command and os.fsencode(runs) in command
+            if is_typed or (entry / "comm").read_text().strip() == forked:
                 found.append(int(entry.name))
     return found
