@@ -6,6 +6,9 @@
 The same version gives the same files to the bit: trainings end after so many steps, not at a time. Weights are rounded
 to float16 where that costs no lap, for half of the bytes in the package, and read as float32. The last line on stdout
 is JSON: file and SHA-256 of the weights by starter.
+
+Who is to be fast on one road, once somebody trains it there, brings a teacher along: trained on the same roads, but
+paid by the metre alone. What its run says of reward and settings is how it goes on, not how it learned so far.
 """
 
 from __future__ import annotations
@@ -23,14 +26,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft import load_track, train
+from racecraft.learn import DistillConfig
 from racecraft.learn.learner import below
+from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.run.starters import FOLDER
 from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
 from racecraft.track import joint_digest
 from racecraft.training.parent import WEIGHTS
+from racecraft.training.plan import make_plan
+from racecraft.training.start import read_settings
+from racecraft.training.taught import taught, teachers_arrays
 
 BOXES = Objects(obstacles=Obstacles(placement="random"))
+
+
+class Teacher(NamedTuple):
+    """Of who goes on with a starter on one road: what it is paid for, also afterwards, and how long it learns."""
+
+    reward: str
+    lessons: DistillConfig
 
 
 class Starter(NamedTuple):
@@ -42,10 +57,12 @@ class Starter(NamedTuple):
     objects: Objects = NO_OBJECTS
     is_short: bool = True
     """Whether its weights are kept in 16 bits."""
+    teacher: Teacher | None = None
 
 
+PACE = DistillConfig(teacher_steps=8_000_000, teacher_rate_steps=3_000_000)
 STARTERS = {
-    "quick": Starter("everywhere", "1500000 steps"),
+    "quick": Starter("everywhere", "1500000 steps", teacher=Teacher("lap_time", PACE)),
     "steady": Starter("steady", "400000 steps"),
     "dodger": Starter("traffic", "3000000 steps", track="speedway", objects=BOXES, is_short=False),
 }
@@ -75,12 +92,32 @@ def main() -> None:
                 root=scratch,
                 name=name,
             )
-            digests[name] = write_starter(RunFolder.open(trained.run), options.output / name, starter)
+            brought = {} if starter.teacher is None else teachers_weights(starter, options.num_threads, Path(scratch))
+            digests[name] = write_starter(RunFolder.open(trained.run), options.output / name, starter, brought)
     print(json.dumps(digests))
 
 
-def write_starter(run: RunFolder, path: Path, starter: Starter) -> dict[str, str]:
+def teachers_weights(starter: Starter, num_threads: int, scratch: Path) -> dict[str, NDArray[Any]]:
+    """A teacher of many roads, as a checkpoint names it; its student sees just as much as it takes to save one."""
+    assert starter.teacher is not None
+    reward, lessons = starter.teacher
+    settings = {"recipe": starter.recipe, "reward": reward, "distill": lessons, "until": "512 steps", "seed": SEED}
+    trained = train(**settings, num_threads=num_threads, root=scratch, name="teacher")
+    run = RunFolder.open(trained.run)
+    arrays = teachers_arrays(run.checkpoints.load("last"), read_settings(run), run.read_model_metadata())
+    return {name: halves(name, array) for name, array in arrays.items()}
+
+
+def write_starter(
+    run: RunFolder, path: Path, starter: Starter, brought: dict[str, NDArray[Any]] | None = None
+) -> dict[str, str]:
     """The best checkpoint's weights, without anything of its training, as a run of its own; file and digest of them.
+
+    Args:
+        run: That it learned in.
+        path: Folder to be written.
+        starter: What it is to be.
+        brought: What a checkpoint holds of a teacher.
 
     Raises:
         ValueError: As `halves`; what is at the path stays.
@@ -94,19 +131,33 @@ def write_starter(run: RunFolder, path: Path, starter: Starter) -> dict[str, str
     path.mkdir(parents=True)
     for name in FILES:
         shutil.copyfile(run.path / name, path / name)
+    if starter.teacher is not None:
+        (path / FILES[0]).write_text(load_preset(starter.teacher.reward), encoding="utf-8")
     made = RunFolder(path)
     origin = {"format": "racecraft", "recipe": path.name, "step": saved.step}
     metadata = {"network": saved.metadata["network"], "origin": origin}
-    made.checkpoints.save(0, weights, metadata=metadata, time_stamp=datetime.fromisoformat(CREATED).timestamp())
+    made.checkpoints.save(
+        0, {**weights, **(brought or {})}, metadata=metadata, time_stamp=datetime.fromisoformat(CREATED).timestamp()
+    )
     info, track = run.read_info(), load_track(starter.track)
     versions = {"racecraft": info.versions["racecraft"]}
-    settings = {**info.settings, "objects": starter.objects.to_dict()}
+    settings = {**_goes_on_by(starter, info.settings, run), "objects": starter.objects.to_dict(), "num_threads": 0}
     digest = joint_digest([track])
     made.write_info(
         replace(info, track=track.name, track_digest=digest, settings=settings, created=CREATED, versions=versions)
     )
     (entry,) = made.checkpoints.entries()
     return {"file": entry.file, "sha256": entry.sha256}
+
+
+def _goes_on_by(starter: Starter, settings: dict[str, Any], run: RunFolder) -> dict[str, Any]:
+    """The settings it learned by, or those of who learns the one road that it names."""
+    if starter.teacher is None:
+        return settings
+    actions = run.read_model_metadata().action_space
+    plan = make_plan(starter.track, reward=starter.teacher.reward, actions=actions, algorithm="distill")
+    goes_on = replace(plan.settings, distill=taught(plan.settings.distill)).to_dict()
+    return {name: goes_on[name] for name in settings}
 
 
 def halves(name: str, weights: NDArray[Any]) -> NDArray[np.float16]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from racecraft import evaluate, generalize
 from racecraft.errors import RunError
 from racecraft.learn.learner import below
 from racecraft.race.policy import load_policy
+from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.run.checkpoint import header_of
 from racecraft.run.starters import FOLDER, starter_names, unpack_starter
@@ -20,6 +22,8 @@ from racecraft.sim import Objects
 from racecraft.training.parent import open_parent
 from racecraft.training.plan import make_plan
 from racecraft.training.recipes import TRAFFIC
+from racecraft.training.stop import Until
+from racecraft.training.taught import RATE, TEACHERS
 
 UNSEEN = "generated:500..503,radius=0.6"
 MOST_BYTES = 2 << 20
@@ -67,6 +71,23 @@ def test_what_begins_from_one_is_whole(here: Path) -> None:
     assert {name: array.tobytes() for name, array in below("weights/", child.load().arrays).items()} == {
         name: array.tobytes() for name, array in read.items()
     }
+
+
+@pytest.mark.parametrize(
+    ("track", "critic"), [("hairpin", "privileged"), (None, "privileged"), ("grand_circuit", "lap")]
+)
+def test_who_goes_on_with_the_quick_one_is_to_be_fast_on_that_road(track: str | None, critic: str, here: Path) -> None:
+    """By the road's own defaults, paid by the metre, and taught by what comes with it."""
+    plan = make_plan(track, parent="starter:quick")
+    anew = make_plan(track, algorithm="distill", actions="continuous", reward="lap_time")
+    lessons = anew.settings.distill
+    taught = replace(lessons, teacher_steps=lessons.teacher_steps // 2, teacher_rate=RATE)
+    assert plan.settings == replace(anew.settings, distill=taught)
+    assert (plan.settings.critic, plan.settings.until) == (critic, Until.parse("no better lap or 10 minutes"))
+    assert plan.reward == load_preset("lap_time")
+    brought = below(TEACHERS, plan.start(root=here / "children").parent_checkpoint.load().arrays)
+    assert brought["weights/policy.head.weight"].shape == (2, 64)
+    assert all(array.any() for array in brought.values())
 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf, 65_520.0])

@@ -59,6 +59,8 @@ class DistillConfig:
     """Steps of each of them in one iteration."""
     teacher_steps: int = 250_000
     """Steps of the teacher before the student begins; they render no camera and do not count as camera steps."""
+    teacher_rate: float = TEACHER_PPO.learning_rate
+    """Adam's step size of the teacher."""
     teacher_rate_steps: int = 700_000
     """Of its steps, after as many its step size is a half of what it was, after twice as many a third; 0: never."""
     gamma: float = PPOConfig.gamma
@@ -93,7 +95,7 @@ class DistillConfig:
             check_whole(name, getattr(self, name), 1, is_plain=True)
         for name in ("teacher_rate_steps", "student_steps", "rate_steps", "refining_rate_steps"):
             check_whole(name, getattr(self, name), 0, is_plain=True)
-        for name in ("learning_rate", "refining_rate", "gamma"):
+        for name in ("learning_rate", "teacher_rate", "refining_rate", "gamma"):
             check_number(name, getattr(self, name), 0.0, 1.0, is_plain=True)
         samples = self.num_envs * self.num_steps
         is_enough = self.buffer_size >= samples
@@ -161,7 +163,13 @@ class Distill:
         teacher_spec = replace(learner.spec, state_size=self.state_size)
         teacher = NativeStateLearner(teacher_spec, seed=seed, num_threads=num_threads)
         cars = open_teacher(teacher)
-        ppo = replace(TEACHER_PPO, num_envs=cars.num_envs, rate_steps=config.teacher_rate_steps, gamma=config.gamma)
+        ppo = replace(
+            TEACHER_PPO,
+            num_envs=cars.num_envs,
+            learning_rate=config.teacher_rate,
+            rate_steps=config.teacher_rate_steps,
+            gamma=config.gamma,
+        )
         if not learner.spec.is_discrete:
             ppo = replace(ppo, ent_coef=0.0)
         self.teacher = PPO(ppo, teacher, StateWorld(cars), seed=seed)

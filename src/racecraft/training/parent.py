@@ -86,7 +86,7 @@ class Parent:
                 hint=f"Give --network {name}, or leave out --from.",
             )
         kept = fitting(self.weights, spec)
-        _require_finite(self.saved, kept)
+        require_finite(self.saved, kept)
         return _sentences(kept, spec)
 
 
@@ -134,6 +134,12 @@ def is_weights_only(saved: Checkpoint | StoredCheckpoint) -> bool:
     return "origin" in saved.metadata
 
 
+def is_starter(saved: Checkpoint) -> bool:
+    """Whether they are of a policy that comes with Racecraft, which learned on other roads than its run names."""
+    origin = saved.metadata.get("origin")
+    return isinstance(origin, dict) and origin.get("format") == "racecraft"
+
+
 def origin_of(saved: Checkpoint) -> dict[str, Any]:
     """Where the weights that a run begins with came from: what an import says, or a parent's checkpoint and step."""
     named = {name: saved.metadata[name] for name in ("file", "step") if name in saved.metadata}
@@ -150,11 +156,11 @@ def begin_from(learner: Learner, saved: Checkpoint) -> None:
         kept = fitting(below(WEIGHTS, saved.arrays), learner.spec)
     except ConfigError as error:
         raise CheckpointError(f"{saved.path} cannot be begun from: {error}") from error
-    _require_finite(saved, kept)
+    require_finite(saved, kept)
     learner.load_weights({**learner.weights(), **kept})
 
 
-def _require_finite(saved: Checkpoint, kept: Arrays) -> None:
+def require_finite(saved: Checkpoint, kept: Arrays) -> None:
     """Refuse weights of which no training comes; those that are left behind do no harm."""
     for name, array in kept.items():
         if not np.isfinite(array).all():

@@ -11,13 +11,16 @@ from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.sim.objects import NO_OBJECTS
-from racecraft.training.parent import Parent, open_parent
+from racecraft.training.parent import Parent, is_starter, open_parent
 from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
 from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings, of_the_files
 from racecraft.training.start import read_settings, start_run
 from racecraft.training.stop import Until
+from racecraft.training.taught import taught, teachers_arrays
 
-_OF_THE_TRACK = ("start", "evaluate_every", "evaluation_trials")
+_ITS_OWN = ("until", "seed", "algorithm", "tells_nearby", "num_threads")
+"""Settings that no run has of its parent."""
+_OF_THE_TRACK = ("start", "evaluate_every", "evaluation_trials", "distill")
 """Settings that follow from the tracks, so they are a parent's only on its tracks."""
 
 
@@ -80,10 +83,11 @@ def make_plan(
     """
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
-    theirs, is_taught = None if parent is None else parent.folder, False
+    theirs = None if parent is None else parent.folder
     before = None if theirs is None else read_settings(theirs)
     objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
     opponents = settings.get("opponents", None if before is None else before.opponents)
+    is_crowded = objects != NO_OBJECTS or opponents is not None
     regime, method = regime_of(objects=objects, opponents=opponents), METHODS.get(algorithm, METHODS["ppo"])
     if model_metadata is not None:
         metadata = ModelMetadata.load(model_metadata)
@@ -109,25 +113,28 @@ def make_plan(
         source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
     if algorithm:
         metadata = _with_algorithm(metadata, algorithm)
-    is_fast = algorithm == "distill" and metadata.action_space.kind == "continuous"
-    usual = regime_of(objects=objects, opponents=opponents, is_fast_distill=is_fast).until
-    limit = Until.parse(until or usual) if isinstance(until, str) else until
     parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
+    is_new_track = parent is not None and (track is not None or is_starter(parent.saved))
+    is_taught = False
     if theirs is not None:
         if parameters is None and "ppo" not in settings:
             parameters = theirs.read_hyperparameters()
-        inherited = _inherited(theirs, metadata, is_new_track=track is not None, follows_aws=parameters is not None)
+        may_be_fast = is_new_track and metadata.action_space.kind == "continuous"
+        said = {"hyperparameters": parameters, **settings}
+        is_taught = not algorithm and (is_crowded or may_be_fast) and _is_taught(before, metadata, said)
+        algorithm = algorithm or ("distill" if is_taught else of_the_files(metadata))
+    is_fast = algorithm == "distill" and metadata.action_space.kind == "continuous"
+    usual = regime_of(objects=objects, opponents=opponents, is_fast_distill=is_fast).until
+    limit = Until.parse(until or usual) if isinstance(until, str) else until
+    if theirs is not None:
+        inherited = _inherited(theirs, metadata, is_new_track=is_new_track, follows_aws=parameters is not None)
         if model_metadata is not None:
             inherited.pop("vehicle")  # the file's version decides
+        if is_taught:
+            inherited.pop("distill", None)
         of_the_parent = inherited.pop("track")
         track = of_the_parent if track is None else track
-        is_crowded = objects != NO_OBJECTS or opponents is not None
-        said = {"hyperparameters": parameters, **settings}
-        is_taught = not algorithm and is_crowded and _is_taught(before, metadata, said)
-        if is_taught:
-            del inherited["distill"]
         settings = {**inherited, **settings}
-        algorithm = algorithm or ("distill" if is_taught else of_the_files(metadata))
     made = make_settings(
         metadata=metadata,
         hyperparameters=parameters,
@@ -137,8 +144,10 @@ def make_plan(
         algorithm=algorithm,
         **settings,
     )
-    if is_taught:
+    if is_taught and is_crowded:
         made = replace(made, distill=replace(made.distill, student_steps=1))  # it knows its lessons
+    if parent is not None and "distill" not in settings and teachers_arrays(parent.saved, made, metadata):
+        made = replace(made, distill=taught(made.distill))
     return Plan(
         settings=made,
         reward=source,
@@ -156,7 +165,10 @@ def _with_algorithm(metadata: ModelMetadata, algorithm: str) -> ModelMetadata:
 
 
 def _is_taught(before: TrainSettings | None, metadata: ModelMetadata, said: Mapping[str, Any]) -> bool:
-    """Whether a child of a taught model gets a teacher as well, where others are about: PPO's step needs its critic."""
+    """Whether a child of a taught model gets a teacher as well.
+
+    Where others are about, PPO's step needs its critic; on another road, fast laps need one that knows it.
+    """
     is_told = any(said.get(name) for name in ("hyperparameters", "ppo", "distill", "critic", "device"))
     was_taught = before is not None and before.algorithm == "distill"
     return was_taught and not is_told and of_the_files(metadata) == "ppo"
@@ -165,7 +177,9 @@ def _is_taught(before: TrainSettings | None, metadata: ModelMetadata, said: Mapp
 def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:
     """The settings of a parent that its child has as well, unless the user says otherwise."""
     theirs = read_settings(folder)
-    left_out = {"until", "seed", "algorithm", "tells_nearby", *(_OF_THE_TRACK if is_new_track else ())}
+    left_out = {*_ITS_OWN, *(_OF_THE_TRACK if is_new_track else ())}
+    if is_new_track and theirs.critic != "camera":
+        left_out.add("critic")  # how much of a lap it should know hangs on its length
     values = {setting.name: getattr(theirs, setting.name) for setting in fields(theirs) if setting.name not in left_out}
     is_same_kind = folder.read_model_metadata().action_space.kind == metadata.action_space.kind
     if follows_aws:

@@ -128,7 +128,9 @@ DUEL: Final = Regime(
     },
 )
 RACED_STEPS: Final = 10_000
-"""Of a teacher in a race, for every second that a training may take: 20 µs each."""
+"""Of a teacher in a race, for every second that a training may take: 20 µs each, and it drives every car."""
+FAST_STEPS: Final = 30_000
+"""Of one that is to be fast alone: a third of the time, of two cores."""
 FAST_DISTILL: Final = Regime(
     # Every fourth episode starts as a race does, since a car that comes from standing meets the first corner otherwise
     # than one that flies past the line, as the other three do.

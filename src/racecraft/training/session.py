@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from racecraft.agent import Hyperparameters, ModelMetadata
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError, typed
-from racecraft.learn import Algorithm, Learner, NetworkSpec
+from racecraft.learn import Algorithm, Distill, Learner, NetworkSpec
 from racecraft.reward import RewardWorker, keeps_state
 from racecraft.run import (
     AwsLog,
@@ -41,6 +41,7 @@ from racecraft.training.meter import Meter
 from racecraft.training.parent import begin_from, is_weights_only, origin_of
 from racecraft.training.settings import TrainSettings
 from racecraft.training.start import aws_hyperparameters, require_trainable, require_valid_reward
+from racecraft.training.taught import begin_taught
 
 if TYPE_CHECKING:
     from racecraft.race.policy import NetworkPolicy
@@ -234,9 +235,11 @@ def open_session(
             since=since,
             begun=None if begun is None else origin_of(begun),
         )
-        if saved is None and settings.algorithm == "distill":
+        if saved is None and isinstance(session.algorithm, Distill):
+            is_taught = begun is not None and begin_taught(session.algorithm, begun)
+            before = " It begins with what an earlier one knew." if is_taught else ""
             steps = settings.distill.teacher_steps
-            note(f"A teacher, told where everything is, learns first: {steps:,} steps without a camera.")
+            note(f"A teacher, told where everything is, learns first: {steps:,} steps without a camera.{before}")
         if saved is not None:
             session.load(saved)
             forgotten = "; what the reward function remembered begins anew" if run.copies > 1 else ""

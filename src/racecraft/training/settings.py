@@ -25,6 +25,7 @@ from racecraft.training.nearby_view import NEARBY_COLUMNS
 from racecraft.training.opponents import Opponents
 from racecraft.training.regimes import (
     BRISK_SECONDS,
+    FAST_STEPS,
     LONG_ROAD,
     LONG_SECONDS,
     METHODS,
@@ -292,7 +293,9 @@ def make_settings(
     is_fast = algorithm == "distill" and is_continuous
     circumstances["most_speed"] = metadata.action_space.most_speed if algorithm == "distill" else 0.0
     regime = regime_of(**circumstances, is_fast_distill=is_fast, lessons=_lessons(roads, until))
-    lessons = _as_long_as(until, regime.distill, is_raced=circumstances["opponents"] is not None)
+    is_raced = circumstances["opponents"] is not None
+    pace = RACED_STEPS if is_raced else FAST_STEPS if is_fast else 0
+    lessons = _as_long_as(until, regime.distill, pace=pace)
     usual = {
         "start": regime.start,
         "evaluation_trials": regime.evaluation_trials,
@@ -350,18 +353,21 @@ def _lessons(roads: Sequence[Track], until: Until | None) -> str:
     return "long" if seconds >= LONG_SECONDS else "brisk" if seconds >= BRISK_SECONDS else "short"
 
 
-def _as_long_as(until: Until | None, distill: DistillConfig | None, *, is_raced: bool) -> DistillConfig | None:
+def _as_long_as(until: Until | None, distill: DistillConfig | None, *, pace: int) -> DistillConfig | None:
     """The same lessons, for a training of few steps by a teacher of few: at most five to one of the student's.
 
-    A race's teacher is slow, as it drives every car, so of a short training it gets about a fifth of the time.
+    Args:
+        until: When the training ends.
+        distill: The lessons of one that has time for them.
+        pace: Teacher's steps at most for every second that it may take; 0 for any number.
     """
     if not isinstance(until, Until) or distill is None:
         return distill
     most = [distill.teacher_steps]
     if until.steps:
         most.append(5 * until.steps)
-    if until.seconds and is_raced:
-        most.append(max(1, round(RACED_STEPS * until.seconds)))
+    if until.seconds and pace:
+        most.append(max(1, round(pace * until.seconds)))
     return replace(distill, teacher_steps=min(most))
 
 

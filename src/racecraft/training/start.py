@@ -20,6 +20,7 @@ from racecraft.track import Track, joint_digest, load_tracks
 from racecraft.training.parent import WEIGHTS, Parent
 from racecraft.training.regimes import METHODS, AlgorithmConfig
 from racecraft.training.settings import TrainSettings
+from racecraft.training.taught import teachers_arrays
 
 
 def start_run(
@@ -104,8 +105,9 @@ def write_run(
     record = None
     if parent is not None:
         saved, record = parent.saved, parent.record()
-        weights = {f"{WEIGHTS}{name}": array for name, array in parent.weights.items()}
-        folder.parent_checkpoint.save(saved.step, weights, metadata={"network": saved.metadata["network"], **record})
+        arrays = {f"{WEIGHTS}{name}": array for name, array in parent.weights.items()}
+        arrays |= teachers_arrays(saved, settings, metadata)
+        folder.parent_checkpoint.save(saved.step, arrays, metadata={"network": saved.metadata["network"], **record})
     folder.write_info(
         RunInfo(
             seed=settings.seed,

@@ -1,17 +1,10 @@
-"""Tour roads it has never seen: pay for every metre really gained, but not for taking a bend at the limit of the tyres.
+"""Race against the clock: pay for every metre of the lap that the car really gained since the last step.
 
-As `lap_time`, with two margins. Metres near the border are worth half of those in the middle, and accelerating across
-the road harder than COMFORT costs: that leaves a third of the front tyres' grip for what a driver could not know. It
-remembers where the car was a step ago. Best with `--recipe everywhere`.
+`racing` pays for the speed that was commanded; this pays for progress, which a car makes none of while it slides, and
+more of on the inside of a bend. It remembers where the car was a step ago. Best with `--actions continuous`.
 """
 
-import math
-
 OFF_TRACK_PENALTY = -1.0
-BORDER_LOSS = 0.5  # fraction of the reward that is lost at the border
-COMFORT = 2.0  # m/s2 across the road
-HASTE_PENALTY = 0.05  # for each time COMFORT beyond it
-WHEELBASE = 0.165  # m
 
 before = {"steps": 0.0, "progress": 0.0}  # this car, a step ago
 
@@ -24,13 +17,4 @@ def reward_function(params):
 
     if params["is_offtrack"] or params["is_crashed"]:
         return OFF_TRACK_PENALTY
-    if not is_next_step:
-        return 0.0
-
-    # On a circle of this radius: speed squared over radius.
-    curvature = math.tan(math.radians(abs(params["steering_angle"]))) / WHEELBASE
-    across = params["speed"] ** 2 * curvature
-
-    offset = params["distance_from_center"] / (0.5 * params["track_width"])
-    metres = gain * (1.0 - BORDER_LOSS * min(offset, 1.0) ** 2)
-    return metres - HASTE_PENALTY * max(across / COMFORT - 1.0, 0.0)
+    return gain if is_next_step else 0.0
