@@ -221,6 +221,27 @@ def test_axe_finds_nothing_serious(flaws: dict[str, dict[str, Any]], theme: str)
     assert flaws[theme] == {}
 
 
+@pytest.mark.slow
+@needs_pages
+@needs_browser
+def test_paper_is_dark_on_white_whatever_the_screen_is(visited: tuple[RunningConsole, Any]) -> None:
+    console, page = visited
+    page.goto(f"{console.client.base_url}/settings")
+    page.evaluate("localStorage.setItem('racecraft-theme', 'dark')")
+    page.reload()
+    page.locator("html[data-theme=dark] h1").wait_for()
+    colour = "getComputedStyle(document.querySelector('h1')).color"
+    screen = page.evaluate(colour)
+    page.emulate_media(media="print")
+    paper = page.evaluate(colour)
+    assert page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == "rgb(255, 255, 255)"
+    assert (screen, paper) == ("rgb(237, 240, 243)", "rgb(27, 31, 36)")
+    assert not page.locator("nav").first.is_visible()
+    page.emulate_media(media="screen")
+    assert page.locator("nav").first.is_visible()
+    page.evaluate("localStorage.removeItem('racecraft-theme')")
+
+
 def _colours(png: bytes) -> set[Any]:
     from PIL import Image
 
