@@ -96,33 +96,41 @@ for url in sys.stdin:
 """
 
 
-def opened_together(urls: Sequence[str]) -> None:
-    """Two processes bring each of some databases up to date, both at the same moment."""
-    both = [
-        subprocess.Popen([sys.executable, "-c", OPENS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        for _ in range(2)
-    ]
-    for url in urls:
-        for said, answer in ((url, "\n"), ("", "migrated\n")):
-            for process in both:
-                print(said, file=process.stdin, flush=True)
-            assert [process.stdout.readline() for process in both if process.stdout] == [answer] * 2
+@pytest.fixture(scope="module")
+def two_servers() -> Iterator[list[subprocess.Popen[str]]]:
+    """Processes that open what they are told; most of their start is loading."""
+    command = [sys.executable, "-c", OPENS]
+    both = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    yield both
     for process in both:
         process.communicate()
         assert process.returncode == 0
 
 
-@pytest.mark.costly
-def test_two_servers_that_make_a_database_at_the_same_moment_make_one(tmp_path: Path) -> None:
-    opened_together([f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(20)])
+def opened_together(both: Sequence[subprocess.Popen[str]], urls: Sequence[str]) -> None:
+    """Two processes bring each of some databases up to date, both at the same moment."""
+    for url in urls:
+        for said, answer in ((url, "\n"), ("", "migrated\n")):
+            for process in both:
+                print(said, file=process.stdin, flush=True)
+            assert [process.stdout.readline() for process in both if process.stdout] == [answer] * 2
 
 
 @pytest.mark.costly
-def test_two_servers_bring_an_old_database_up_to_date_once(database_url: str) -> None:
+def test_two_servers_that_make_a_database_at_the_same_moment_make_one(
+    tmp_path: Path, two_servers: list[subprocess.Popen[str]]
+) -> None:
+    opened_together(two_servers, [f"sqlite:///{tmp_path / f'{number}.db'}" for number in range(20)])
+
+
+@pytest.mark.costly
+def test_two_servers_bring_an_old_database_up_to_date_once(
+    database_url: str, two_servers: list[subprocess.Popen[str]]
+) -> None:
     database = Database(database_url)
     with database._alone() as connection:
         upgrade(connection, "0015")
-    opened_together([database_url])
+    opened_together(two_servers, [database_url])
     database.require_current()
     with database.transaction() as session:
         assert list(session.scalars(sa.select(User.name))) == ["you"]
@@ -130,8 +138,10 @@ def test_two_servers_bring_an_old_database_up_to_date_once(database_url: str) ->
 
 
 @pytest.mark.costly
-def test_two_servers_that_fill_an_empty_postgresql_fill_it_once(postgres: PostgresServer) -> None:
-    opened_together([postgres.new_database() for _ in range(10)])
+def test_two_servers_that_fill_an_empty_postgresql_fill_it_once(
+    postgres: PostgresServer, two_servers: list[subprocess.Popen[str]]
+) -> None:
+    opened_together(two_servers, [postgres.new_database() for _ in range(10)])
 
 
 def test_a_database_that_cannot_be_opened_is_told(tmp_path: Path) -> None:

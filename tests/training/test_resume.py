@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import signal
 import subprocess
 import sys
 import time
 import warnings
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +36,28 @@ def reward_function(params):
 """
 
 
+LOADED = """
+import os, sys, traceback
+from racecraft import train
+from racecraft.learn import PPOConfig
+from racecraft.training import algorithms, evaluator, resume
+for line in sys.stdin:
+    if child := os.fork():
+        print(child, flush=True)
+        os.waitpid(child, 0)
+        print("ended", flush=True)
+        continue
+    os.dup2(2, 1)
+    try:
+        exec(line)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(0)
+"""
+"""Has each line done by a process of its own, whose start would be mostly loading."""
+
+
 @pytest.mark.costly
 def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
     """The folder, copied while training goes on, is what a kill at that moment leaves."""
@@ -54,30 +78,42 @@ def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, t
         assert logs(path) == logs(result.run)
 
 
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 @pytest.mark.slow
 def test_a_run_killed_20_times_ends_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
     undisturbed = tiny(until="16384 steps", name="undisturbed")
     start = (
-        "from racecraft import train; from racecraft.learn import PPOConfig; train('oval', reward='centerline', "
+        "train('oval', reward='centerline', "
         "ppo=PPOConfig(num_envs=8, num_steps=8, minibatch_size=32, update_epochs=1), until='16384 steps', "
         "evaluate_every=128, evaluation_trials=2, num_threads=1, root='.', name='killed')"
     )
-    go_on = "from racecraft.training import resume; resume('killed')"
+    go_on = "resume('killed')"
     run, rng = tmp_path / "killed", np.random.default_rng()
     manifest = run / "checkpoints" / "manifest.json"
-    for _ in range(20):
-        before = manifest.stat().st_mtime_ns if manifest.exists() else 0
-        process = subprocess.Popen([sys.executable, "-c", go_on if before else start], cwd=tmp_path)
-        try:
+    command = [sys.executable, "-c", LOADED]
+    with subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as loaded:
+        assert loaded.stdin is not None
+        assert loaded.stdout is not None
+        for _ in range(20):
+            before = manifest.stat().st_mtime_ns if manifest.exists() else 0
+            print(go_on if before else start, file=loaded.stdin, flush=True)
+            process = int(loaded.stdout.readline())
             deadline = time.monotonic() + 300
-            while process.poll() is None and time.monotonic() < deadline:
+            while _lives(process) and time.monotonic() < deadline:
                 if manifest.exists() and manifest.stat().st_mtime_ns != before:
                     break
                 time.sleep(0.001)
             time.sleep(float(rng.uniform(0.0, 0.1)))
-        finally:
-            process.kill()
-            process.wait()
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+            assert loaded.stdout.readline() == "ended\n"
     recorder = Recorder()
     resume(run, reporter=recorder)
     assert recorder.notes[0].startswith("Resumed at step")
