@@ -178,3 +178,18 @@ def test_an_archives_teacher_of_another_shape_is_left_where_it_is(parent: Path, 
     assert plan.settings.distill == FAST_DISTILL.distill
     assert brought(plan.start(root=tmp_path / "children")) == {}
     assert open_parent(f"{odd}@last").saved.step == saved.step + 1
+
+
+@pytest.mark.parametrize(("algorithm", "log_std"), [("distill", -1.0), ("ppo", -2.5)])
+def test_who_has_lessons_begins_as_unsure_as_from_nothing(
+    tiny: Train, parent: Path, tmp_path: Path, algorithm: str, log_std: float
+) -> None:
+    sure = tmp_path / "sure"
+    shutil.copytree(parent, sure)
+    store = RunFolder.open(sure).checkpoints
+    saved = store.load("last")
+    saved.arrays["weights/policy.log_std"] = np.float32([-2.5, -2.5])
+    store.save(saved.step + 1, saved.arrays, metadata=saved.metadata)
+    asked = {"algorithm": algorithm, "distill": replace(SHORT, teacher_steps=1)}
+    child = tiny("hairpin", parent=f"{sure}@last", until="64 steps", evaluate_every=64, **asked).run
+    np.testing.assert_allclose(weights(child)["weights/policy.log_std"], log_std, atol=0.1)

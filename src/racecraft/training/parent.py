@@ -146,8 +146,14 @@ def origin_of(saved: Checkpoint) -> dict[str, Any]:
     return dict(saved.metadata.get("origin", named))
 
 
-def begin_from(learner: Learner, saved: Checkpoint) -> None:
+def begin_from(learner: Learner, saved: Checkpoint, *, has_lessons: bool = False) -> None:
     """Give a learner with fresh weights those of a parent that fit it.
+
+    Args:
+        learner: To begin with them.
+        saved: The parent's.
+        has_lessons: Whether a teacher is to follow. Its answers lie many of a driver's small standard deviations away,
+            and gradients would speak of nothing else for long: who has lessons begins as unsure as from nothing.
 
     Raises:
         CheckpointError: The copy of the parent's weights is not of this network, or one is NaN or infinite.
@@ -157,6 +163,8 @@ def begin_from(learner: Learner, saved: Checkpoint) -> None:
     except ConfigError as error:
         raise CheckpointError(f"{saved.path} cannot be begun from: {error}") from error
     require_finite(saved, kept)
+    if has_lessons:
+        kept.pop("policy.log_std", None)
     learner.load_weights({**learner.weights(), **kept})
 
 

@@ -213,7 +213,7 @@ def open_session(
 
             simulation = open_cars() if cars_to_be is None else cars_to_be.result()
         if begun is not None:
-            begin_from(learner, begun)
+            begin_from(learner, begun, has_lessons=settings.algorithm == "distill")
         worker.wait()
 
         since = _begin_stretch(run, note)
