@@ -38,13 +38,27 @@ class RunningWorker:
 
 @contextmanager
 def running_worker(
-    runs: Path, *options: str, database: str = "", artifacts: str = "", trusted: Path | None = None
+    runs: Path,
+    *options: str,
+    database: str = "",
+    artifacts: str = "",
+    trusted: Path | None = None,
+    is_forked: bool = False,
 ) -> Iterator[RunningWorker]:
+    """A worker until the block ends.
+
+    Args:
+        runs: Its folder, whose name is the machine's.
+        options: Further words of its command.
+        database: The URL of the console's, and `artifacts` that of its store; nothing for who comes with a token.
+        trusted: File of the authority that it trusts.
+        is_forked: Whether it and its jobs are spared their loading, as who reaches the database always is. Of a fork
+            nothing can be seen of its environment and of how it ended.
+    """
     words = ["worker", "--json", "--runs", str(runs), "--machine", runs.name, *options]
-    if database:
-        process = started(*words, RACECRAFT_DATABASE=database, RACECRAFT_ARTIFACTS=artifacts)
-    else:  # of one with a token tests look at its environment and at how it ended, which a fork does not show
-        process = typed(*words, **({} if trusted is None else {"SSL_CERT_FILE": str(trusted)}))
+    shared = {"RACECRAFT_DATABASE": database, "RACECRAFT_ARTIFACTS": artifacts} if database else {}
+    shared |= {} if trusted is None else {"SSL_CERT_FILE": str(trusted)}
+    process = (started if database or is_forked else typed)(*words, **shared)
     try:
         assert process.stdout is not None
         yield RunningWorker(process, json.loads(process.stdout.readline())["machine"], runs)

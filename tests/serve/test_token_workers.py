@@ -45,7 +45,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc"),
 ]
 
-UNTIL = "16000 steps"
+UNTIL = "8000 steps"
 
 
 class Place:
@@ -61,11 +61,11 @@ class Place:
         made = ok(self.league.owner.post("/api/account/tokens", json=asked), 201)
         return made["id"], made["secret"]
 
-    def worker(self, name: str, token: str) -> AbstractContextManager[RunningWorker]:
+    def worker(self, name: str, token: str, *, is_forked: bool = True) -> AbstractContextManager[RunningWorker]:
         file = self.folder / f"{name}.token"
         file.write_text(f"{token}\n")
         file.chmod(0o600)
-        return running_worker(self.folder / name, "--server", self.url, "--token-file", str(file))
+        return running_worker(self.folder / name, "--server", self.url, "--token-file", str(file), is_forked=is_forked)
 
     def hand(self, token: str) -> Hand:
         hand = Hand(self.url, token)
@@ -182,7 +182,7 @@ def same_bits(one: RunFolder, other: RunFolder) -> None:
 def test_a_token_and_an_address_are_enough(place: Place) -> None:
     job, calm = place.training("away", seed=1)
     client = place.console.client
-    with place.worker("lab-1", token := place.token()[1]) as worker:
+    with place.worker("lab-1", token := place.token()[1], is_forked=False) as worker:
         ended = place.done(job)
         assert ended["machine"].startswith("lab-1#")
         same_bits(calm, here := RunFolder(place.console.runs / "away"))
@@ -207,9 +207,9 @@ def test_a_token_and_an_address_are_enough(place: Place) -> None:
 
 
 def test_what_a_revoked_token_had_ends_elsewhere_in_the_same_bits(place: Place) -> None:
-    job, calm = place.training("passed-on", seed=3, until="30000 steps")
+    job, calm = place.training("passed-on", seed=3, until="20000 steps")
     number, secret = place.token()
-    with place.worker("shut-out", secret) as worker:
+    with place.worker("shut-out", secret, is_forked=False) as worker:
         place.console.wait_for(lambda: place.saved("passed-on"))
         ok(place.league.owner.delete(f"/api/account/tokens/{number}"), 204)
         began = time.monotonic()
@@ -237,9 +237,9 @@ def test_a_league_on_postgresql_and_s3_has_workers_that_know_of_neither(
                 environment.setenv(name, value)
             league = stack.enter_context(running_league(tmp_path / "console", *options))
             place = Place(league, tmp_path, store)
-        job, calm = place.training("away", seed=7, until="60000 steps")
+        job, calm = place.training("away", seed=7, until="30000 steps")
         number, secret = place.token()
-        worker = stack.enter_context(place.worker("killed", secret))
+        worker = stack.enter_context(place.worker("killed", secret, is_forked=False))
         for process in (worker.process.pid, *worker.children()):
             environ = Path(f"/proc/{process}/environ").read_bytes()
             assert not [told for told in (database, store, s3.address) if told.encode() in environ]
@@ -260,13 +260,14 @@ def test_killed_worker_and_killed_server_lose_nothing(tmp_path: Path) -> None:
     port = free_port()
     with ExitStack() as stack:
         place = stack.enter_context(place_at(tmp_path, port))
-        job, calm = place.training("tough", seed=4, until="100000 steps")
+        job, calm = place.training("tough", seed=4, until="40000 steps")
         token = place.token()[1]
         worker = stack.enter_context(place.worker("lab", token))
         place.console.wait_for(lambda: place.saved("tough"))
         worker.kill()
         worker = stack.enter_context(place.worker("lab", token))
         place.console.wait_for(lambda: place.row(job).attempts == 2)
+        assert place.row(job).state == "running"
         place.console.kill()
         options = ["--league", "--artifacts", f"file://{tmp_path}/store", "--trainings", "0", "--port", str(port)]
         place.console = stack.enter_context(running_console(place.console.runs, *options))
