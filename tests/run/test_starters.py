@@ -23,7 +23,7 @@ from racecraft.training.parent import open_parent
 from racecraft.training.plan import make_plan
 from racecraft.training.recipes import TRAFFIC
 from racecraft.training.stop import Until
-from racecraft.training.taught import RATE, TEACHERS
+from racecraft.training.taught import TEACHERS, taught
 
 UNSEEN = "generated:500..503,radius=0.6"
 MOST_BYTES = 2 << 20
@@ -80,9 +80,7 @@ def test_who_goes_on_with_the_quick_one_is_to_be_fast_on_that_road(track: str | 
     """By the road's own defaults, paid by the metre, and taught by what comes with it."""
     plan = make_plan(track, parent="starter:quick")
     anew = make_plan(track, algorithm="distill", actions="continuous", reward="lap_time")
-    lessons = anew.settings.distill
-    taught = replace(lessons, teacher_steps=lessons.teacher_steps // 2, teacher_rate=RATE)
-    assert plan.settings == replace(anew.settings, distill=taught)
+    assert plan.settings == replace(anew.settings, distill=taught(anew.settings.distill))
     assert (plan.settings.critic, plan.settings.until) == (critic, Until.parse("no better lap or 10 minutes"))
     assert plan.reward == load_preset("lap_time")
     brought = below(TEACHERS, plan.start(root=here / "children").parent_checkpoint.load().arrays)

@@ -88,6 +88,7 @@ def test_what_it_is_told_beyond_that_begins_with_no_weight(tiny: Train, parent: 
     plan = make_plan("grand_circuit", parent=parent, until="2 minutes")
     assert plan.settings.critic == "lap"
     assert plan.settings.distill.teacher_rate == RATE
+    assert (plan.settings.distill.teacher_steps, plan.settings.distill.student_steps) == (1_500_000, 150_000)
     known = brought(plan.start(root=tmp_path / "children"))["weights/policy.dense1.weight"]
     short = {"distill": replace(SHORT, teacher_steps=1, teacher_rate=1e-9), "algorithm": "distill", "critic": "lap"}
     child = tiny("grand_circuit", parent=parent, until="64 steps", evaluate_every=64, **short).run

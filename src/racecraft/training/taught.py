@@ -58,8 +58,17 @@ def teachers_arrays(parent: Checkpoint, settings: TrainSettings, metadata: Model
 
 
 def taught(lessons: DistillConfig) -> DistillConfig:
-    """The lessons of a teacher that knows something: half as long, and in smaller steps."""
-    return replace(lessons, teacher_steps=max(1, lessons.teacher_steps // 2), teacher_rate=RATE)
+    """The lessons of a teacher that knows something, in smaller steps, and of a student that sees already.
+
+    Both take half as long, but what is the least for who has to learn to see is enough.
+    """
+    enough = min(lessons.student_steps, DistillConfig.student_steps)
+    return replace(
+        lessons,
+        teacher_steps=max(1, lessons.teacher_steps // 2),
+        teacher_rate=RATE,
+        student_steps=max(enough, lessons.student_steps // 2),
+    )
 
 
 def begin_taught(algorithm: Distill, parent: Checkpoint) -> bool:
