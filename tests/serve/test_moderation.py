@@ -15,7 +15,7 @@ from racecraft.replay.replay import read_replay
 from racecraft.serve.people.people import People, add_person
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.settings import STATE_FOLDER
-from racecraft.serve.store.tables import Member
+from racecraft.serve.store.tables import Member, Submission
 from racecraft.serve.submissions import tasks
 
 TEACHER = 1
@@ -86,3 +86,16 @@ def test_nobody_is_called_as_pages_know_who_has_no_name_yet(court: Court, name: 
         people.rename(ADA, name)
     with pytest.raises(Conflict, match="looks like one that is"), court.database.transaction() as session:
         add_person(session, name)
+
+
+def test_nobody_lets_in_again_what_left_with_its_owner(court: Court, tmp_path: Path) -> None:
+    number = court.entries.submit(RACE, pack_entry(untrained_run(tmp_path / "runs", "novice")), model="x", user_id=ADA)
+    out: dict[str, Any] = {"race_id": RACE, "submission_id": number, "user_id": TEACHER}
+    court.entries.disqualify(reason="Too early.", **out)
+    court.entries.disqualify(reason="", **out)
+    People(court.database).remove(ADA)
+    for reason in ("", "Too late."):
+        with pytest.raises(Conflict, match="deleted their account"):
+            court.entries.disqualify(reason=reason, **out)
+    with court.database.transaction() as session:
+        assert session.get_one(Submission, number).disqualified == "Withdrawn by its owner."

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { authorOf, carsShown, isUnnamed, namesShown } from "./names";
+import { authorOf, carsShown, doerOf, isUnnamed, nameShown, namesShown, reasonShown } from "./names";
 
 test("nobody reads that they wrote themselves what their teacher said", () => {
   expect(authorOf({ author: "you", is_mine: true })).toBe("you");
@@ -37,4 +37,18 @@ test("nobody reads “you” where somebody stands who has no name yet", () => {
       { model: "Comet", laps: [] },
     ],
   });
+});
+
+test("who has deleted their account is said to have, in words of the page", () => {
+  expect(nameShown("(gone 14)")).toBe("deleted account 14");
+  expect(nameShown("Rocket (gone 14)")).toBe("Rocket (gone 14)");
+  expect(reasonShown("Withdrawn by its owner.")).toBe("The account was deleted.");
+  expect(reasonShown("Driven by hand.")).toBe("Driven by hand.");
+});
+
+test("who holds the league reads of themselves what they did", () => {
+  expect(doerOf("you", { name: "you" })).toBe("you");
+  expect(doerOf("you", { name: "Comet" })).toBe("no name yet");
+  expect(doerOf("(gone 3)", { name: "you" })).toBe("deleted account 3");
+  expect(doerOf("", { name: "you" })).toBe("");
 });

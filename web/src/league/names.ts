@@ -4,9 +4,24 @@ import { l } from "./text";
 import type { Me } from "./who.svelte";
 
 const UNNAMED = "you"; // whose console it was before it became a league
+const GONE = /^\(gone (\d+)\)$/; // as the server calls who has deleted their account
+const WITHDRAWN = "Withdrawn by its owner.";
 
 /** What others read where somebody stands by name, on a board say. */
-export const nameShown = (name: string): string => (name === UNNAMED ? l("unnamed") : name);
+export const nameShown = (name: string): string => {
+  const [, number] = GONE.exec(name) ?? [];
+  return number ? l("person_gone", { number }) : name === UNNAMED ? l("unnamed") : name;
+};
+
+/** Who did something, for whoever holds the league. */
+export const doerOf = (name: string, me: Pick<Me, "name"> | null | undefined): string =>
+  name === UNNAMED && me?.name === UNNAMED ? l("comment_by_me") : nameShown(name);
+
+/** Whether an entry is out as its owner has deleted their account, so that nobody lets it in again. */
+export const isWithdrawn = (reason: string): boolean => reason === WITHDRAWN;
+
+/** Why an entry does not count: who organises says so, or the server of who has deleted their account. */
+export const reasonShown = (reason: string): string => (isWithdrawn(reason) ? l("withdrawn") : reason);
 
 /** The same of all in a list. */
 export const namesShown = <T extends { name: string }>(people: T[]): T[] =>

@@ -150,10 +150,14 @@ class Entries:
 
         Raises:
             NotFound: They do not organise the race, or it has no such submission.
+            Conflict: Who entered it has deleted their account.
         """
         self._league.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
-            _submission(session, race_id, submission_id).disqualified = reason.strip()
+            found = _submission(session, race_id, submission_id)
+            if session.get_one(User, found.user_id).deleted is not None:
+                raise Conflict("Who entered this has deleted their account: it stays out.")
+            found.disqualified = reason.strip()
             if not reason:
                 accept(session, submission_id)
 
