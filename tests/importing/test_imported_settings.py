@@ -70,7 +70,9 @@ def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
     assert found.used["DR_ENABLE_DOMAIN_RANDOMIZATION=True"] == "lamps of random colours"
     assert found.used["DR_OA_NUMBER_OF_OBSTACLES=3"] == "objects on the track"
     assert "DR_H2B_BOT_CAR_SPEED=0.2" in found.unused
-    assert "DR_TRAIN_BEST_MODEL_METRIC=reward" in found.unused
+    best = found.unused["DR_TRAIN_BEST_MODEL_METRIC=reward"]
+    assert "among objects the one with most whole laps comes first" in best
+    assert best in (Path(__file__).parents[2] / "docs" / "import.md").read_text("utf-8")
 
     folder = RunFolder.open(found.run)
     assert folder.read_reward_function() == other

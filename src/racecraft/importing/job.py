@@ -81,7 +81,8 @@ def job_settings(params: TrainingParams, given: Mapping[str, str]) -> JobSetting
     }
     unused = {
         "race_type": "other models' cars are not on the track while one trains: it trains as a time trial",
-        "best_model_metric": "the best checkpoint completes most of the lap, then is the fastest",
+        "best_model_metric": "the best checkpoint completes most of the lap, then is the fastest; "
+        "among objects the one with most whole laps comes first",
     }
     if params.race_type in RACES:
         becomes["race_type"] = RACES[params.race_type]
