@@ -104,7 +104,7 @@ def two_servers() -> Iterator[list[subprocess.Popen[str]]]:
     yield both
     for process in both:
         process.communicate()
-        assert process.returncode == 0
+    assert [process.returncode for process in both] == [0, 0]
 
 
 def opened_together(both: Sequence[subprocess.Popen[str]], urls: Sequence[str]) -> None:
