@@ -5,6 +5,7 @@ test("nobody reads that they wrote themselves what their teacher said", () => {
   expect(authorOf({ author: "you", is_mine: true })).toBe("you");
   expect(authorOf({ author: "you", is_mine: false })).toBe("from who organises the group");
   expect(authorOf({ author: "Ms Frizzle", is_mine: false })).toBe("Ms Frizzle");
+  expect(authorOf({ author: "(gone 3)", is_mine: false })).toBe("deleted account 3");
 });
 
 test("who holds the league is asked for a name, and nobody else", () => {

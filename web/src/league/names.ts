@@ -39,4 +39,4 @@ export const isUnnamed = (me: Pick<Me, "name" | "role"> | null | undefined): boo
 
 /** Who said something about a model: only organisers do. */
 export const authorOf = (one: Pick<CommentInfo, "author" | "is_mine">): string =>
-  one.is_mine ? l("comment_by_me") : one.author === UNNAMED ? l("comment_by_organiser") : one.author;
+  one.is_mine ? l("comment_by_me") : one.author === UNNAMED ? l("comment_by_organiser") : nameShown(one.author);
