@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
+from alive_processes import is_alive
 from racecraft.env import RacecraftEnv, RacecraftVectorEnv
 from racecraft.env.rewards import IsolatedReward, open_reward
 from racecraft.errors import RewardError
@@ -21,14 +20,6 @@ def rewards_of(reward, *, steps=8, seed=0):
     with RacecraftEnv("oval", observation="state", reward=reward) as env:
         env.reset(seed=seed)
         return [env.step(5)[1] for _ in range(steps)]
-
-
-def is_alive(process_id):
-    try:
-        os.kill(process_id, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def test_text_file_preset_and_callable_say_the_same(tmp_path):

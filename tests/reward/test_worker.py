@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from workers import function, is_alive, running
+from workers import function, running
 
+from alive_processes import is_alive
 from racecraft.errors import ConfigError, RewardError, ShapeError
 from racecraft.reward import worker_process
 from racecraft.reward.source import load_preset

@@ -10,8 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from workers import function, is_alive, running
+from workers import function, running
 
+from alive_processes import is_alive
 from racecraft.errors import RewardError
 from racecraft.reward import worker as worker_module
 from racecraft.reward.worker import MAX_BATCH

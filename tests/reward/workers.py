@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 
 from racecraft.reward.worker import RewardWorker
 
@@ -20,11 +19,3 @@ def running(source, track, **options):
     options = {"timeout_s": 1.0} | options
     with RewardWorker(source, track, **options) as worker:
         yield worker
-
-
-def is_alive(process_id: int) -> bool:
-    try:
-        os.kill(process_id, 0)
-    except ProcessLookupError:
-        return False
-    return True

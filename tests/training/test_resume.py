@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from tiny_runs import TINY, Recorder, Train, assert_same, logs, weights
 
+from alive_processes import is_alive
 from racecraft import training
 from racecraft.errors import CheckpointError, ConfigError, RunError
 from racecraft.run import RunFolder
@@ -78,14 +79,6 @@ def test_a_run_killed_at_any_iteration_resumes_as_if_it_never_was(tiny: Train, t
         assert logs(path) == logs(result.run)
 
 
-def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 @pytest.mark.slow
 def test_a_run_killed_20_times_ends_as_if_it_never_was(tiny: Train, tmp_path: Path) -> None:
     undisturbed = tiny(until="16384 steps", name="undisturbed")
@@ -106,7 +99,7 @@ def test_a_run_killed_20_times_ends_as_if_it_never_was(tiny: Train, tmp_path: Pa
             print(go_on if before else start, file=loaded.stdin, flush=True)
             process = int(loaded.stdout.readline())
             deadline = time.monotonic() + 300
-            while _lives(process) and time.monotonic() < deadline:
+            while is_alive(process) and time.monotonic() < deadline:
                 if manifest.exists() and manifest.stat().st_mtime_ns != before:
                     break
                 time.sleep(0.001)

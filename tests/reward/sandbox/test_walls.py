@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from workers import function, is_alive, running
+from workers import function, running
 
+from alive_processes import is_alive
 from racecraft.errors import RewardError
 from racecraft.reward import RewardWorker, keeps_state, launch, load_preset, preset_names, situations
 from racecraft.reward.sandbox import UNCONFINED, Confinement, confinement, find_confinement, make_plan
