@@ -12,7 +12,7 @@ from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.sim.objects import NO_OBJECTS
 from racecraft.training.parent import Parent, is_starter, open_parent
-from racecraft.training.regimes import METHODS, TIME_TRIAL, regime_of
+from racecraft.training.regimes import METHODS, TIME_TRIAL, Regime, regime_of
 from racecraft.training.settings import DEFAULT_TRACK, TrainSettings, make_settings, of_the_files
 from racecraft.training.start import read_settings, start_run
 from racecraft.training.stop import Until
@@ -83,63 +83,39 @@ def make_plan(
     """
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
-    theirs = None if parent is None else parent.folder
-    before = None if theirs is None else read_settings(theirs)
-    objects = settings.get("objects", NO_OBJECTS if before is None else before.objects)
-    opponents = settings.get("opponents", None if before is None else before.opponents)
-    is_crowded = objects != NO_OBJECTS or opponents is not None
-    regime, method = regime_of(objects=objects, opponents=opponents), METHODS.get(algorithm, METHODS["ppo"])
-    if model_metadata is not None:
-        metadata = ModelMetadata.load(model_metadata)
-    elif theirs is None or actions is not None:
-        suited = regime.actions if "discrete" in method.actions else "continuous"
-        chosen = suited if actions is None else actions
-        space = action_space(chosen) if isinstance(chosen, str) else chosen
-        if theirs is None:
-            suite = regime.sensors if method.sees_all else TIME_TRIAL.sensors
-            metadata = ModelMetadata(
-                action_space=space, neural_network="RACECRAFT_SMALL", sensors=tuple(sensors or suite)
-            )
-        else:
-            metadata = replace(theirs.read_model_metadata(), action_space=space)
-    else:
-        metadata = theirs.read_model_metadata()
-    if theirs is not None and model_metadata is None and sensors:
-        metadata = replace(metadata, sensors=tuple(sensors))
-    if reward or theirs is None:
-        kind = {"objects": objects, "opponents": opponents, "most_speed": metadata.action_space.most_speed}
-        source, is_foreign = load_reward(reward or regime_of(**kind).reward), False
-    else:
-        source, is_foreign = theirs.read_reward_function(), theirs.read_info().foreign
-    if algorithm:
-        metadata = _with_algorithm(metadata, algorithm)
+    before = None if parent is None else read_settings(parent.folder)
+    company: dict[str, Any] = {
+        "objects": settings.get("objects", NO_OBJECTS if before is None else before.objects),
+        "opponents": settings.get("opponents", None if before is None else before.opponents),
+    }
+    metadata = _metadata(parent, regime_of(**company), actions, sensors, model_metadata, algorithm)
+    source, is_foreign = _reward(parent, reward, company, metadata)
     parameters = None if hyperparameters is None else Hyperparameters.load(hyperparameters)
-    is_new_track = parent is not None and (track is not None or is_starter(parent.saved))
+    is_crowded = company != {"objects": NO_OBJECTS, "opponents": None}
+    is_continuous = metadata.action_space.kind == "continuous"
     is_taught = False
-    if theirs is not None:
+    if parent is not None and before is not None:
         if parameters is None and "ppo" not in settings:
-            parameters = theirs.read_hyperparameters()
-        may_be_fast = is_new_track and metadata.action_space.kind == "continuous"
+            parameters = parent.folder.read_hyperparameters()
+        is_new_track = track is not None or is_starter(parent.saved)
         said = {"hyperparameters": parameters, **settings}
-        is_taught = not algorithm and (is_crowded or may_be_fast) and _is_taught(before, metadata, said)
+        may_be = not algorithm and (is_crowded or (is_new_track and is_continuous))
+        is_taught = may_be and _is_taught(before, metadata, said)
         algorithm = algorithm or ("distill" if is_taught else of_the_files(metadata))
-    is_fast = algorithm == "distill" and metadata.action_space.kind == "continuous"
-    usual = regime_of(objects=objects, opponents=opponents, is_fast_distill=is_fast).until
-    limit = Until.parse(until or usual) if isinstance(until, str) else until
-    if theirs is not None:
-        inherited = _inherited(theirs, metadata, is_new_track=is_new_track, follows_aws=parameters is not None)
+        inherited = _inherited(parent, before, metadata, is_new_track=is_new_track, follows_aws=parameters is not None)
         if model_metadata is not None:
-            inherited.pop("vehicle")  # the file's version decides
+            del inherited["vehicle"]  # the file's version decides
         if is_taught:
             inherited.pop("distill", None)
         of_the_parent = inherited.pop("track")
         track = of_the_parent if track is None else track
         settings = {**inherited, **settings}
+    usual = regime_of(**company, is_fast_distill=algorithm == "distill" and is_continuous).until
     made = make_settings(
         metadata=metadata,
         hyperparameters=parameters,
         track=DEFAULT_TRACK if track is None else track,
-        until=limit,
+        until=Until.parse(until or usual) if isinstance(until, str) else until,
         seed=seed,
         algorithm=algorithm,
         **settings,
@@ -158,33 +134,71 @@ def make_plan(
     )
 
 
+def _metadata(
+    parent: Parent | None,
+    regime: Regime,
+    actions: ActionSpace | str | None,
+    sensors: Sequence[str],
+    file: str | Path | None,
+    algorithm: str,
+) -> ModelMetadata:
+    """What the policy sees and does: as a file says, or the parent, or what suits the kind of training."""
+    if file is not None:
+        return _with_algorithm(ModelMetadata.load(file), algorithm)
+    space = action_space(actions) if isinstance(actions, str) else actions
+    if parent is not None:
+        made = parent.folder.read_model_metadata()
+        made = replace(made, action_space=space or made.action_space, sensors=tuple(sensors) or made.sensors)
+    else:
+        method = METHODS.get(algorithm, METHODS["ppo"])
+        usual = regime.actions if "discrete" in method.actions else "continuous"
+        made = ModelMetadata(
+            action_space=space or action_space(usual),
+            neural_network="RACECRAFT_SMALL",
+            sensors=tuple(sensors) or (regime.sensors if method.sees_all else TIME_TRIAL.sensors),
+        )
+    return _with_algorithm(made, algorithm)
+
+
+def _reward(
+    parent: Parent | None, reward: str | Path | None, company: Mapping[str, Any], metadata: ModelMetadata
+) -> tuple[str, bool]:
+    """Source of the reward function, and whether it is somebody else's."""
+    if parent is not None and not reward:
+        return parent.folder.read_reward_function(), parent.folder.read_info().foreign
+    most_speed = metadata.action_space.most_speed
+    return load_reward(reward or regime_of(**company, most_speed=most_speed).reward), False
+
+
 def _with_algorithm(metadata: ModelMetadata, algorithm: str) -> ModelMetadata:
-    """The metadata that says, as far as AWS's file can, what trains."""
+    """The metadata that says, as far as AWS's file can, what trains, if that is said."""
+    if not algorithm:
+        return metadata
     is_sac = algorithm == "sac" and metadata.action_space.kind == "continuous"
     return replace(metadata, training_algorithm="sac" if is_sac else "clipped_ppo")
 
 
-def _is_taught(before: TrainSettings | None, metadata: ModelMetadata, said: Mapping[str, Any]) -> bool:
+def _is_taught(before: TrainSettings, metadata: ModelMetadata, said: Mapping[str, Any]) -> bool:
     """Whether a child of a taught model gets a teacher as well.
 
     Where others are about, PPO's step needs its critic; on another road, fast laps need one that knows it.
     """
     is_told = any(said.get(name) for name in ("hyperparameters", "ppo", "distill", "critic", "device"))
-    was_taught = before is not None and before.algorithm == "distill"
-    return was_taught and not is_told and of_the_files(metadata) == "ppo"
+    return before.algorithm == "distill" and not is_told and of_the_files(metadata) == "ppo"
 
 
-def _inherited(folder: RunFolder, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool) -> dict[str, Any]:
+def _inherited(
+    parent: Parent, before: TrainSettings, metadata: ModelMetadata, *, is_new_track: bool, follows_aws: bool
+) -> dict[str, Any]:
     """The settings of a parent that its child has as well, unless the user says otherwise."""
-    theirs = read_settings(folder)
     left_out = {*_ITS_OWN, *(_OF_THE_TRACK if is_new_track else ())}
-    if is_new_track and theirs.critic != "camera":
+    if is_new_track and before.critic != "camera":
         left_out.add("critic")  # how much of a lap it should know hangs on its length
-    values = {setting.name: getattr(theirs, setting.name) for setting in fields(theirs) if setting.name not in left_out}
-    is_same_kind = folder.read_model_metadata().action_space.kind == metadata.action_space.kind
+    values = {setting.name: getattr(before, setting.name) for setting in fields(before) if setting.name not in left_out}
+    is_same_kind = parent.folder.read_model_metadata().action_space.kind == metadata.action_space.kind
     if follows_aws:
         del values["ppo"]
-        values["num_envs"] = theirs.ppo.num_envs
+        values["num_envs"] = before.ppo.num_envs
     elif not is_same_kind:
         del values["ppo"]  # what suits a table of actions does not suit a Gaussian
     return values
