@@ -9,6 +9,9 @@ from racecraft.errors import ConfigError
 from racecraft.serve.groups.schemas import NewGroup
 from racecraft.serve.naming import plain_text
 from racecraft.serve.people.names import checked_name, handle_of
+from racecraft.serve.people.people import People, add_person
+from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.store.database import Database
 
 HONEST = [
     *(
@@ -76,3 +79,18 @@ def test_titles_are_on_one_line() -> None:
     assert NewGroup(title=" Our\n cup  7 ").title == "Our cup 7"
     with pytest.raises(ValidationError):
         NewGroup(title=" \n ")
+
+
+@pytest.mark.parametrize("name", ["(gone {})", "(Gone {})", "（gone {}）", "gone{}"])
+def test_nobody_takes_the_name_of_who_goes_and_keeps_them_from_going(database: Database, name: str) -> None:
+    people = People(database)
+    with database.transaction() as session:
+        ada, bob = add_person(session, "Ada"), add_person(session, "Bob")
+    with pytest.raises(Conflict, match="is taken"):
+        people.rename(bob, name.format(ada))
+    with pytest.raises(Conflict, match="is taken"), database.transaction() as session:
+        add_person(session, name.format(ada))
+    people.rename(bob, "Gone with the wind")
+    people.remove(ada)
+    with pytest.raises(NotFound):
+        people.get(ada)

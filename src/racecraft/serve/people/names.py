@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from typing import Final
 
@@ -11,6 +12,7 @@ from racecraft.serve.naming import plain_text
 MAX_NAME: Final = 32
 ALIKE: Final = ("LATIN", "CYRILLIC", "GREEK")
 """Scripts whose letters are taken for each other: no name has those of two."""
+_GONE: Final = re.compile(r"gone\d+")
 
 
 def checked_name(name: str) -> str:
@@ -33,3 +35,13 @@ def handle_of(name: str) -> str:
     folded = unicodedata.normalize("NFKC", name).casefold()
     bare = unicodedata.normalize("NFKD", folded)
     return "".join(sign for sign in bare if sign.isalnum()) or folded
+
+
+def gone_name(user_id: int) -> str:
+    """What who has deleted their account is called, which the pages say in the reader's language."""
+    return f"(gone {user_id})"
+
+
+def is_gone_name(name: str) -> bool:
+    """Whether a name is taken for such a one: with it somebody could pass for gone, or keep another from going."""
+    return _GONE.fullmatch(handle_of(name)) is not None

@@ -10,7 +10,7 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from racecraft.serve.people.keys import hold_account, require_still_in, revoke_all
-from racecraft.serve.people.names import checked_name, handle_of
+from racecraft.serve.people.names import checked_name, gone_name, handle_of, is_gone_name
 from racecraft.serve.people.passwords import hash_password, is_password
 from racecraft.serve.problems import Conflict, NotFound, NotLetIn
 from racecraft.serve.settings import OWNER
@@ -161,7 +161,7 @@ class People:
         with self._database.transaction() as session:
             hold_account(session, user_id)
             user = session.get_one(User, user_id)
-            user.name, user.handle, user.password = f"(gone {user_id})", None, ""
+            user.name, user.handle, user.password = gone_name(user_id), None, ""
             user.role, user.deleted = "racer", now()
             revoke_all(session, user_id)
             session.execute(sa.delete(Member).where(Member.user_id == user_id))
@@ -199,7 +199,7 @@ def use_invitation(session: Session, code: str) -> Invitation | None:
 
 
 def _flush(session: Session, name: str) -> None:
-    if handle_of(name) == LOCAL_USER:  # by which the pages know who has no name yet
+    if handle_of(name) == LOCAL_USER or is_gone_name(name):  # by which the pages know who has no name yet, or none now
         raise _taken(name)
     try:
         session.flush()

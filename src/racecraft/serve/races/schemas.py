@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
 from racecraft.film.ghost import MAX_GHOSTS
 from racecraft.serve.conditions import AskedRanges, AskedVehicle
@@ -13,7 +13,7 @@ from racecraft.serve.evaluations.schemas import RoadObject
 from racecraft.serve.naming import PLAIN
 from racecraft.serve.races.ghost_schemas import CheckpointChoice, Ghost
 from racecraft.serve.road import OnRoad, Seconds
-from racecraft.serve.schemas import Message, RunName
+from racecraft.serve.schemas import Message, Moment, RunName
 from racecraft.serve.tracks.schemas import TrackGeometry, TrackSector
 from racecraft.sim.objects import MAX_OBJECTS
 
@@ -84,9 +84,9 @@ class NewRace(RankedSettings):
     """Of each entry, from as many places of the lap; the median of their scores counts."""
     seed: int | None = Field(None, ge=0, le=2**32 - 1)
     """Of starts and objects, for practice: everybody knows it. By default both are drawn from a secret."""
-    opens: AwareDatetime | None = None
+    opens: Moment | None = None
     """By default now."""
-    closes: AwareDatetime | None = None
+    closes: Moment | None = None
 
 
 class RaceChange(Message):
@@ -94,7 +94,7 @@ class RaceChange(Message):
 
     title: Title | None = None
     description: str | None = Field(None, max_length=500)
-    closes: AwareDatetime | None = None
+    closes: Moment | None = None
 
 
 class RaceCard(Message):

@@ -21,14 +21,24 @@ def now() -> datetime:
 
 
 class UtcTime(TypeDecorator[datetime]):
-    """A moment that comes back with its zone, from SQLite too."""
+    """A moment in UTC, whatever zone it was told in: SQLite keeps none, and PostgreSQL gives it in its server's."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
 
+    def process_bind_param(self, value: datetime | None, dialect: object) -> datetime | None:
+        """Tell the database the moment in UTC; a bare time is."""
+        return _in_utc(value)
+
     def process_result_value(self, value: datetime | None, dialect: object) -> datetime | None:
-        """Give a bare time its zone."""
-        return value.replace(tzinfo=UTC) if value is not None and value.tzinfo is None else value
+        """Give a bare time its zone, and a moment of another one this."""
+        return _in_utc(value)
+
+
+def _in_utc(value: datetime | None) -> datetime | None:
+    if value is None or value.tzinfo is UTC:
+        return value
+    return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
 class Table(DeclarativeBase):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
 from racecraft.serve.conditions import AskedVehicle
 from racecraft.serve.races.schemas import NewRace, RaceKind, RaceState, Ranking, Title
-from racecraft.serve.schemas import Message, RunName
+from racecraft.serve.schemas import Message, Moment, RunName
 
 RaceForm = Literal["alone", "head-to-head", "bracket"]
 """Everybody against the clock, or two at a time: everyone against everyone, or who loses is out."""
@@ -73,7 +73,7 @@ class LeagueRaceChange(Message):
 
     title: Title | None = None
     description: str | None = Field(None, max_length=500)
-    closes: AwareDatetime | None = None
+    closes: Moment | None = None
     is_public: bool | None = None
     is_frozen: bool | None = None
     attempts_per_day: int | None = Field(None, ge=0, le=1000)
