@@ -70,6 +70,7 @@ def test_every_setting_is_accounted_for(tmp_path: Path) -> None:
     assert found.used["DR_ENABLE_DOMAIN_RANDOMIZATION=True"] == "lamps of random colours"
     assert found.used["DR_OA_NUMBER_OF_OBSTACLES=3"] == "objects on the track"
     assert "DR_H2B_BOT_CAR_SPEED=0.2" in found.unused
+    assert found.unused["DR_LOCAL_S3_PRETRAINED_PREFIX=older"] == "counts until the model has weights of its own"
     best = found.unused["DR_TRAIN_BEST_MODEL_METRIC=reward"]
     assert "among objects the one with most whole laps comes first" in best
     assert best in (Path(__file__).parents[2] / "docs" / "import.md").read_text("utf-8")
@@ -159,7 +160,7 @@ def test_the_page_names_every_setting_that_is_known() -> None:
         *settings_of_drfc.ALIASES,
         *settings_of_drfc.NO_EFFECT,
         settings_of_drfc.MODEL_PREFIX,
-        settings_of_drfc.PRETRAINED,
+        *settings_of_drfc.PRETRAINING,
     ):
         assert f"`{name}`" in table, name
     named = set(re.findall(r"`(DR_[A-Z0-9_*]+)`", table)) - {"DR_OA_*", "DR_H2B_*"}
@@ -167,7 +168,7 @@ def test_the_page_names_every_setting_that_is_known() -> None:
         concrete = name.replace("*", "X")
         known = {*settings_of_drfc.TRAINING, *settings_of_drfc.EVALUATION, *settings_of_drfc.FILES}
         known |= settings_of_drfc.OBJECTS.keys()
-        known |= {*settings_of_drfc.ALIASES, settings_of_drfc.MODEL_PREFIX, settings_of_drfc.PRETRAINED}
+        known |= {*settings_of_drfc.ALIASES, settings_of_drfc.MODEL_PREFIX, *settings_of_drfc.PRETRAINING}
         assert name in known or settings_of_drfc.meaning(concrete) is not None, name
 
 

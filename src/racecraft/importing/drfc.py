@@ -54,6 +54,8 @@ MODEL_PREFIX: Final = "DR_LOCAL_S3_MODEL_PREFIX"
 PRETRAINED: Final = "DR_LOCAL_S3_PRETRAINED"
 PRETRAINED_PREFIX: Final = "DR_LOCAL_S3_PRETRAINED_PREFIX"
 PRETRAINED_CHECKPOINT: Final = "DR_LOCAL_S3_PRETRAINED_CHECKPOINT"
+PRETRAINING: Final = (PRETRAINED, PRETRAINED_PREFIX, PRETRAINED_CHECKPOINT)
+"""Whether a model goes on from another one's weights, that one's name, and which of its checkpoints."""
 
 ALIASES: Final = {
     "DR_CHANGE_START_POSITION": "DR_TRAIN_CHANGE_START_POSITION",
@@ -94,7 +96,7 @@ NO_EFFECT: Final = {
     "DR_EVAL_OPP_*": "there are no opponents in an evaluation",
     "DR_*_RTF": "the simulator runs as fast as it can",
     "DR_TARGET_REWARD_SCORE": "hyperparameters.json has it as term_cond_avg_score",
-    "DR_TRAIN_MAX_STEPS_PER_ITERATION": "an iteration keeps all steps of its episodes",
+    "DR_TRAIN_MAX_STEPS_PER_ITERATION": "an iteration has 10,000 steps at the most",
     "DR_TRAIN_MULTI_CONFIG": "all cars drive on one track; worker-*.env files are not read",
     "DR_WORKERS": "cars drive side by side in one process: racecraft train --num-envs",
     "DR_RUN_ID": "runs do not share a machine's ports",
@@ -168,7 +170,7 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
         ConfigError: A setting that has a meaning here has a value that is not allowed.
     """
     settings, notes = _renamed(env)
-    meant = (*TRAINING, *EVALUATION, *OBJECTS, MODEL_PREFIX, PRETRAINED)
+    meant = (*TRAINING, *EVALUATION, *OBJECTS, MODEL_PREFIX, *PRETRAINING)
     unresolved = {key: setting for key, setting in settings.items() if setting.is_variable and key in meant}
     notes += [
         f"{key}={s.value} names a variable, which is not resolved; its default counts." for key, s in unresolved.items()
@@ -186,9 +188,8 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
     if MODEL_PREFIX in values:
         used[f"{MODEL_PREFIX}={values[MODEL_PREFIX]}"] = "name of the run, and of the folder of its history"
     pretrained = values.get(PRETRAINED_PREFIX, "") if values.get(PRETRAINED, "").lower() == "true" else ""
-    if PRETRAINED in values:
-        why = "counts until the model has weights of its own" if pretrained else "there is no other model to go on from"
-        without_effect[f"{PRETRAINED}={values[PRETRAINED]}"] = why
+    why = "counts until the model has weights of its own" if pretrained else "there is no other model to go on from"
+    without_effect.update({f"{key}={values[key]}": why for key in PRETRAINING if key in values})
     return DrfcSettings(
         params=params,
         given=given,
@@ -207,7 +208,7 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
 
 def meaning(name: str) -> str | None:
     """Why a known setting has no effect here; None where it has one, or is not known."""
-    if name in (*TRAINING, *EVALUATION, *FILES, *OBJECTS, *ALIASES, MODEL_PREFIX, PRETRAINED):
+    if name in (*TRAINING, *EVALUATION, *FILES, *OBJECTS, *ALIASES, MODEL_PREFIX, *PRETRAINING):
         return None
     for pattern, why in NO_EFFECT.items():
         start, star, end = pattern.partition("*")
@@ -284,7 +285,7 @@ def _files(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
 
 def _others(settings: Mapping[str, EnvSetting]) -> tuple[dict[str, str], dict[str, str]]:
     """Settings without effect, and unknown ones."""
-    meant = [*TRAINING, *EVALUATION, *FILES, *OBJECTS, MODEL_PREFIX, PRETRAINED]
+    meant = [*TRAINING, *EVALUATION, *FILES, *OBJECTS, MODEL_PREFIX, *PRETRAINING]
     without_effect, unknown = {}, {}
     for key in settings:
         if key in meant:
