@@ -6,7 +6,7 @@
 #
 # In a slot machine a choice changes only what is paid. Nearly everywhere else it also changes **where one is next**:
 # who brakes late must take what the bend then offers. So a learner has to look ahead. The trick that makes this
-# possible is sixty years old, and fits in one line.
+# possible is seventy years old, and fits in one line.
 
 # %% [markdown]
 # ## A frozen lake

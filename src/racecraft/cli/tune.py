@@ -30,7 +30,7 @@ def tune(
     trials: Annotated[int, typer.Option("--trials", help="Most trials; 0 for as many as the minutes hold.")] = 0,
     trial_steps: Annotated[int, typer.Option("--trial-steps", help="Camera steps after which a trial ends.")] = 40_000,
     actions: Annotated[
-        str, typer.Option("--actions", help="Action space: default, aws, fast, safe or continuous.")
+        str, typer.Option("--actions", help="Action space: default, aws, fast, safe, steady or continuous.")
     ] = "default",
     model_metadata: Annotated[
         Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
