@@ -22,7 +22,7 @@ from racecraft.serve.people.passwords import hash_password
 from racecraft.serve.people.people import People, add_person
 from racecraft.serve.problems import Conflict, NotLetIn
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Comment, Member, Token
+from racecraft.serve.store.tables import Card, Comment, Invitation, Member, Reset, Token
 
 ADA, AT_ONCE, MOST = 2, 8, 3
 
@@ -75,6 +75,19 @@ def test_as_many_tokens_groups_members_and_comments_as_there_may_be(
     assert len(groups.members(1)) == MOST
     assert successes(lambda _: comments.add(ADA, "model", "well done", author_id=1)) == MOST
     assert count(database, Comment.id) == MOST
+
+
+def test_of_cards_links_and_codes_that_are_made_together_one_is_good(database: Database) -> None:
+    keys, groups = Keys(database), Groups(database)
+    number = groups.create("club", by=People(database).get(ADA))
+    for make, column in (
+        (lambda _: keys.print_card(ADA), Card.digest),
+        (lambda _: keys.make_reset(ADA), Reset.digest),
+        (lambda _: groups.open(number, role="racer", uses=1, hours=1), Invitation.id),
+    ):
+        for _ in range(5):  # those who come together do not always meet
+            assert successes(make) == AT_ONCE
+            assert count(database, column) == 1
 
 
 def test_a_first_password_is_one_of_those_that_are_given_together(database: Database) -> None:

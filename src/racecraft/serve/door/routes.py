@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sqlalchemy as sa
 from fastapi import APIRouter, Request, Response
 
 from racecraft.serve.context import Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.known_browsers import known_as, remember
 from racecraft.serve.people.devices import SECONDS
+from racecraft.serve.people.keys import has_password, shows_card
 from racecraft.serve.people.links import address_of, card_of
 from racecraft.serve.people.names import handle_of
 from racecraft.serve.people.passwords import hash_password
@@ -47,13 +49,13 @@ def sign_in(request: Request, body: SignIn, response: Response, consoles: InLeag
     known = known_as(request, consoles.people, body.name)
     account, address = (f"known {known}", "") if known else (handle_of(body.name), caller(request))
     with consoles.tries.attempt(account=account, address=address) as attempt:
-        user = consoles.people.by_password(body.name, body.password)
-        if user is None:
+        found = consoles.people.by_password(body.name, body.password)
+        if found is None:
             attempt.fail()
             write_down(request, consoles, _named(consoles, body.name), is_in=False)
             raise NotLetIn("There is nobody of that name with that password.")
-    remember(request, response, consoles.people, user)
-    return let_in(request, response, consoles, user)
+    remember(request, response, consoles.people, found[0])
+    return let_in(request, response, consoles, found[0], shown=has_password(*found))
 
 
 @router.post("/card")
@@ -65,7 +67,7 @@ def show_card(request: Request, body: ShowCard, response: Response, consoles: In
         raise NotLetIn(
             "There is no such card, or it is no longer good.", hint="Look at it again, or ask for a new one."
         )
-    return let_in(request, response, consoles, user)
+    return let_in(request, response, consoles, user, shown=shows_card(body.secret))
 
 
 @router.post("/join", status_code=201)
@@ -137,13 +139,36 @@ def sign_out(request: Request, consoles: InConsoles, person: InPerson) -> Respon
 
 
 def let_in(
-    request: Request, response: Response, consoles: Consoles, user: int, *, provider_session: str | None = None
+    request: Request,
+    response: Response,
+    consoles: Consoles,
+    user: int,
+    *,
+    provider_session: str | None = None,
+    shown: sa.ColumnElement[bool] | None = None,
 ) -> Me:
-    """Give a browser a session of somebody; what it had ends. Of who came through a provider: its name for that."""
+    """Give a browser a session of somebody; what it had ends.
+
+    Args:
+        request: Of the browser.
+        response: To it.
+        consoles: Of the league.
+        user: Who comes in.
+        provider_session: Of who came through a provider: its name for that.
+        shown: What they came in by (`racecraft.serve.people.keys`); None of what there was only once.
+
+    Raises:
+        NotLetIn: They were shut out while they came.
+    """
     guard: Guard = request.app.state.guard
+    try:
+        secret = consoles.keys.open_session(user, provider_session=provider_session, shown=shown)
+    except NotLetIn:
+        write_down(request, consoles, user, is_in=False)
+        raise
     write_down(request, consoles, user)
     consoles.keys.close_session(request.cookies.get(COOKIE, ""))  # whoever was here before is so no longer
-    guard.give_cookie(response, consoles.keys.open_session(user, provider_session=provider_session))
+    guard.give_cookie(response, secret)
     return me_of(consoles.people.get(user))
 
 

@@ -90,12 +90,33 @@ class Keys:
         self._database = database
 
     def open_session(
-        self, user_id: int, *, days: int | None = SESSION_DAYS, provider_session: str | None = None
+        self,
+        user_id: int,
+        *,
+        days: int | None = SESSION_DAYS,
+        provider_session: str | None = None,
+        shown: sa.ColumnElement[bool] | None = None,
     ) -> str:
-        """Let a browser in; its cookie. Of one that came through a provider, its name for the sign-in, or empty."""
+        """Let a browser in; its cookie.
+
+        Args:
+            user_id: Who comes in.
+            days: That they stay.
+            provider_session: Of one that came through a provider, its name for the sign-in, or empty.
+            shown: What they came in by, which has to be good still: it was looked at before, and who was shut out
+                since would have a session that nobody ends.
+
+        Raises:
+            NotLetIn: They were shut out meanwhile.
+        """
         secret = secrets.token_urlsafe(32)
         expires = None if days is None else now() + timedelta(days=days)
         with self._database.transaction() as session:
+            hold_account(session, user_id)
+            user = session.get_one(User, user_id)
+            is_shown = shown is None or session.scalar(sa.select(shown))
+            if user.is_locked or user.deleted is not None or not is_shown:
+                raise NotLetIn("You are locked out.", hint="Ask whoever holds your group.")
             mine = Session(digest=digest_of(secret), user_id=user_id, expires=expires)
             mine.provider_session = provider_session
             session.add(mine)
@@ -181,6 +202,7 @@ class Keys:
         """A new card's secret; an earlier card of the same person is worth nothing from now on."""
         secret = "".join(secrets.choice(SIGNS) for _ in range(CARD_LENGTH))
         with self._database.transaction() as session:
+            hold_account(session, user_id)  # of two at the same moment the second finds the other's
             session.execute(sa.delete(Card).where(Card.user_id == user_id))
             session.add(Card(digest=digest_of(secret), user_id=user_id))
         return secret
@@ -193,6 +215,7 @@ class Keys:
         """The secret of a link for a new password; an earlier one is worth nothing from now on."""
         secret = secrets.token_urlsafe(32)
         with self._database.transaction() as session:
+            hold_account(session, user_id)  # of two at the same moment the second finds the other's
             session.execute(sa.delete(Reset).where(Reset.user_id == user_id))
             expires = now() + timedelta(hours=RESET_HOURS)
             session.add(Reset(digest=digest_of(secret), user_id=user_id, expires=expires))
@@ -333,6 +356,21 @@ def require_still_in(session: Transaction, user_id: int, asked_in: str) -> None:
     is_it = sa.and_(Session.digest == asked_in, Session.user_id == user_id, is_valid)
     if asked_in and session.scalar(sa.select(Session.user_id).where(is_it)) is None:
         raise NotLetIn(OUT)
+
+
+def shows_card(secret: str) -> sa.ColumnElement[bool]:
+    """Whether a card is good."""
+    return sa.exists().where(Card.digest == digest_of(plain_code(secret)))
+
+
+def has_password(user_id: int, kept: str) -> sa.ColumnElement[bool]:
+    """Whether somebody's password is that of which this is kept."""
+    return sa.exists().where(User.id == user_id, User.password == kept)
+
+
+def comes_through(issuer: str, subject: str) -> sa.ColumnElement[bool]:
+    """Whether a provider lets somebody in."""
+    return sa.exists().where(Identity.issuer == issuer, Identity.subject == subject, Identity.is_locked.is_(False))
 
 
 def revoke_all(session: Transaction, user_id: int) -> None:

@@ -118,8 +118,8 @@ class People:
                 session.execute(sa.delete(Card).where(Card.user_id == user_id))
         return True
 
-    def by_password(self, name: str, password: str) -> int | None:
-        """Whose name and password these are; takes as long where there is nobody of that name.
+    def by_password(self, name: str, password: str) -> tuple[int, str] | None:
+        """Whose name and password these are, and what is kept of it; takes as long where there is nobody of that name.
 
         Raises:
             NotLetIn: They are right, and of somebody who was locked out.
@@ -131,7 +131,7 @@ class People:
         with self._database.transaction() as session:
             if session.get_one(User, found[0]).is_locked:
                 raise NotLetIn("You are locked out.", hint="Ask whoever holds your group.")
-        return found[0]
+        return found
 
     def confirms(self, user_id: int, password: str) -> bool:
         """Whether it is somebody's password, or they have none."""

@@ -14,7 +14,7 @@ from fastapi.concurrency import run_in_threadpool
 from racecraft.serve.context import AsksProvider, Consoles, InLeague
 from racecraft.serve.door.guard import Guard, caller
 from racecraft.serve.door.routes import fail, let_in, write_down
-from racecraft.serve.people.keys import digest_of
+from racecraft.serve.people.keys import comes_through, digest_of
 from racecraft.serve.people.links import address_of
 from racecraft.serve.people.schemas import Arrived, FromProvider, Me, Newcomer, ToProvider, me_of
 from racecraft.serve.problems import NotLetIn
@@ -58,7 +58,8 @@ def sign_in_by_provider(request: Request, body: FromProvider, response: Response
     if user is None:
         provider.newcomers.meet(browser, whom)
         return Arrived(me=None, is_linked=False)
-    me = let_in(request, response, consoles, user, provider_session=whom.session)
+    shown = comes_through(whom.issuer, whom.subject)
+    me = let_in(request, response, consoles, user, provider_session=whom.session, shown=shown)
     return Arrived(me=me, is_linked=False)
 
 
