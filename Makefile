@@ -90,7 +90,7 @@ format: $(VENV)/.dev $(NODE)  ## apply ruff, clang-format and prettier
 	$(BIN)/clang-format -i native/include/racecraft/*.hpp native/src/*.hpp native/src/*.cpp native/gpu/* native/wasm/*.[ch]pp native/tests/*.cpp
 	cd web && npm run --silent format
 
-bench: $(VENV)/.built $(VENV)/.dev  ## measure everything, rivals included, and print the table
+bench: $(VENV)/.built $(VENV)/.dev  ## measure all but the long trainings, rivals included, and print the table
 	$(BIN)/racecraft bench
 
 setup: $(VENV)/.built  ## only the set-up: .venv with the command .venv/bin/racecraft
