@@ -7,7 +7,8 @@ import pytest
 
 from racecraft.agent import ContinuousActionSpace, DiscreteActionSpace, ModelMetadata, action_space
 from racecraft.agent.action_space import ActionSpace
-from racecraft.car.command import steering_share, throttle
+from racecraft.car.calibration import CarCalibration
+from racecraft.car.command import listed_choices, steering_share, throttle
 from racecraft.car.metadata import car_metadata, car_notes
 from racecraft.errors import ConfigError
 from racecraft.learn import NetworkSpec
@@ -52,6 +53,16 @@ def test_the_car_reads_actions_in_degrees_and_no_more_than_it_needs() -> None:
     assert ModelMetadata.from_dict(document).action_space == continuous(-25, 27, 0.5, 3)
 
 
+def test_a_car_is_told_of_old_files_what_the_simulator_drove() -> None:
+    """Of ±45° and 12 m/s the car would make full lock and full throttle, and less than was learned of all others."""
+    space = table((-45, 4), (-22.5, 12), (0, 8), (45, 1))
+    told = ModelMetadata.from_dict(car_metadata(*of(space))).action_space
+    assert told == table((-30, 4), (-22.5, 4), (0, 4), (30, 1))
+    commands = CarCalibration().commands(listed_choices(told), told)
+    np.testing.assert_allclose(np.degrees(commands[:, 0]), [-30, -22.5, 0, 30], atol=1e-12)
+    np.testing.assert_allclose(commands[:, 1], [4, 4, 4, 1.9], atol=1e-12)
+
+
 @pytest.mark.parametrize(("sensor", "distance", "sectors"), [("LIDAR", 1.0, 64), ("SECTOR_LIDAR", 0.5, 8)])
 def test_a_lidar_comes_with_all_seven_keys(sensor: str, distance: float, sectors: int) -> None:
     metadata, spec = of(action_space("default"), (*FRONT, sensor))
@@ -83,7 +94,8 @@ NOTES = {
     ),
     "one speed": (action_space("steady"), "it is the slider alone that says how fast"),
     "twenty degrees": (table((-20, 1), (20, 1)), "20° here, where it was trained with 20° of 30°"),
-    "forty-five degrees": (table((-45, 1), (45, 1)), "45° here, where it was trained with 30° of 30°"),
+    "forty-five degrees": (table((-45, 1), (45, 2)), "2 of 2 actions ask for more than the simulator's car does"),
+    "eight metres a second": (table((-30, 1), (30, 8)), "1 m/s, 25 % of the largest speed"),
     "unequal": (continuous(-25, 27, 1, 2), "It steers 27° to the left and 25° to the right"),
     "left only": (table((10, 1), (30, 1)), "It steers 30° to the left and 0° to the right"),
 }

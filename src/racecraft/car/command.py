@@ -13,13 +13,33 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.agent.action_space import ActionSpace, ContinuousActionSpace
+from racecraft.agent.action_space import (
+    MAX_SPEED,
+    MAX_STEERING,
+    ActionSpace,
+    ContinuousActionSpace,
+    DiscreteActionSpace,
+)
 from racecraft.errors import ConfigError
 
 Floats = NDArray[np.float64]
 
 CURVE: Final = (-1.2, 2.2)
 """Of the throttle over the share of the largest speed: a parabola through (0, 0), (1/2, 0.8) and (1, 1)."""
+
+
+def as_driven(space: ActionSpace) -> ActionSpace:
+    """The choices as the simulator drove them: wheels stop at 30° and the car at 4 m/s, whatever old files list.
+
+    A car knows no such limits. Told of 45° it would take that for full lock, and 22.5° for half of it, where the policy
+    learned with three quarters.
+    """
+    if isinstance(space, ContinuousActionSpace):
+        return space
+    widest = np.radians(MAX_STEERING)
+    return DiscreteActionSpace(
+        np.column_stack([space.table[:, 0].clip(-widest, widest), space.table[:, 1].clip(max=MAX_SPEED)])
+    )
 
 
 def listed_choices(space: ActionSpace) -> Floats:

@@ -14,6 +14,7 @@ import numpy as np
 
 from racecraft.agent.action_space import MAX_SPEED
 from racecraft.car.calibration import CarCalibration
+from racecraft.car.command import as_driven
 from racecraft.car.driving import CAR_CAMERA, CarPolicy
 from racecraft.car.export import export_run, read_exported
 from racecraft.car.picture import draw_commands
@@ -65,7 +66,7 @@ def evaluate_as_car(
             raise ConfigError("The car has a latency, and so has the randomisation.", hint="Leave one of them away.")
         randomize = replace(randomize, latency=(steps, steps))
     folder = RunFolder.open(run)
-    space = folder.read_model_metadata().action_space
+    space = as_driven(folder.read_model_metadata().action_space)
     camera = replace(trained_camera(folder.read_info()), width=CAR_CAMERA.width, height=CAR_CAMERA.height)
     about = {"as_car": {**asdict(car), "slider_driven_percent": round(100 * car.slider(space), 1)}}
     outcome = evaluate_run(run, load=load, camera=camera, randomize=randomize, about=about, **settings)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from racecraft.agent.action_space import MAX_STEERING, ActionSpace
+from racecraft.agent.action_space import MAX_SPEED, MAX_STEERING, ActionSpace
 from racecraft.agent.lidar import FARTHEST, NEAREST, NUM_SECTORS, SECTOR_LIMIT
 from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensors import LIDAR_RAYS
-from racecraft.car.command import largest, listed_choices, throttle
+from racecraft.car.command import as_driven, largest, listed_choices, throttle
 from racecraft.errors import ConfigError
 from racecraft.learn import NetworkSpec
 
@@ -30,10 +30,11 @@ def car_metadata(metadata: ModelMetadata, spec: NetworkSpec) -> dict[str, Any]:
             f"The car's software does not know the sensor {_UNKNOWN}.",
             hint="Train with --sensors FRONT_FACING_CAMERA, LIDAR or SECTOR_LIDAR.",
         )
-    largest(metadata.action_space)
+    space = as_driven(metadata.action_space)
+    largest(space)
     document: dict[str, Any] = {
-        "action_space": metadata.action_space.to_aws(),
-        "action_space_type": metadata.action_space.kind,
+        "action_space": space.to_aws(),
+        "action_space_type": space.kind,
         "sensor": list(metadata.sensors),
         "training_algorithm": "sac" if spec.is_squashed else "clipped_ppo",
         "neural_network": spec.name,
@@ -61,7 +62,8 @@ def _lidar_config(sensor: str) -> dict[str, float]:
 
 def car_notes(metadata: ModelMetadata, spec: NetworkSpec) -> list[str]:
     """Sentences on what the car does otherwise than the simulator, the weightiest first."""
-    notes = [*_steering_notes(metadata.action_space), *_speed_notes(metadata.action_space)]
+    space = as_driven(metadata.action_space)
+    notes = [*_limit_notes(metadata.action_space, space), *_steering_notes(space), *_speed_notes(space)]
     if spec.is_squashed:
         notes.append("The car clips what SAC squashes, so the graph ends in the hyperbolic tangent.")
     kit = [name for name in metadata.sensors if name in _KIT]
@@ -76,6 +78,16 @@ def car_notes(metadata: ModelMetadata, spec: NetworkSpec) -> list[str]:
     return notes
 
 
+def _limit_notes(listed: ActionSpace, driven: ActionSpace) -> list[str]:
+    beyond = (listed_choices(listed) != listed_choices(driven)).any(axis=1)
+    if not beyond.any():
+        return []
+    return [
+        f"{beyond.sum()} of {len(beyond)} actions ask for more than the simulator's car does: the archive lists them "
+        f"as they were driven, with {MAX_STEERING:g}° and {MAX_SPEED:g} m/s at most."
+    ]
+
+
 def _steering_notes(space: ActionSpace) -> list[str]:
     angles = [math.degrees(angle) for angle in listed_choices(space)[:, 0]]
     widest, left, right = math.degrees(largest(space)[0]), max(angles), -min(angles)
@@ -83,7 +95,7 @@ def _steering_notes(space: ActionSpace) -> list[str]:
     if round(widest, 6) != MAX_STEERING:
         notes.append(
             f"The largest angle is always full lock on a car: {widest:g}° here, where it was trained with "
-            f"{min(widest, MAX_STEERING):g}° of {MAX_STEERING:g}°."
+            f"{widest:g}° of {MAX_STEERING:g}°."
         )
     if not math.isclose(left, right, abs_tol=1e-9):
         notes.append(
