@@ -92,6 +92,20 @@ def test_the_board_places_by_the_rules_of_every_race(database: Database) -> None
     assert [row.row for row in near.rows] == sorted(wanted)
 
 
+@pytest.mark.parametrize(("row", "behind"), [(1, 13), (2, 7), (7, 7), (8, 6), (9, 0), (14, 0)])
+def test_neighbours_and_who_is_behind_are_those_among_equals_too(database: Database, row: int, behind: int) -> None:
+    """Six are second together, and the last six drove equally far without a lap."""
+    scores = [20_000, *[21_000] * 6, 22_000, *[None] * 6]
+    results = [(user, score, score, 0, 0.5 if score is None else 1.0) for user, score in enumerate(scores)]
+    race = _fill(database, results)
+    with database.transaction() as session:
+        board = read_board(session, race, user_id=10 + row - 1, top=1)
+    wanted = {1, *range(max(1, row - AROUND), min(len(scores), row + AROUND) + 1)}
+    assert [one.row for one in board.rows] == sorted(wanted)
+    assert [one.user - 9 for one in board.rows] == sorted(wanted), "of equals, who was first"
+    assert board.behind == behind
+
+
 def test_a_board_of_ten_thousand_is_read_at_once(database: Database) -> None:
     race = _fill(database, [(user, 20_000 + user % 977, 9000 + user % 13, user % 3, 1.0) for user in range(10_000)])
     took = []

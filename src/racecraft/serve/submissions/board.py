@@ -5,8 +5,6 @@ All in one question to the database, so that ten thousand entries take no longer
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -48,6 +46,8 @@ class Board:
     entrants: int
     ranked: int
     first_ms: int | None
+    behind: int
+    """Entrants whose place is behind that of whoever looks; 0 for who is not on it."""
 
 
 def read_board(session: Session, race_id: int, *, user_id: int | None, top: int) -> Board:
@@ -65,38 +65,33 @@ def read_board(session: Session, race_id: int, *, user_id: int | None, top: int)
     told = [key.label(name) for key, name in zip(keys, names, strict=True)]
     # what is sorted is kept small: all else of a row is looked up for the few that are shown
     slim = sa.select(Submission.id, Submission.user_id, *told, number.label("turn")).where(judged).subquery()
-    place = sa.func.rank().over(order_by=[slim.c[name] for name in names])
-    board = sa.select(slim.c.id, slim.c.user_id, slim.c.first_key, place.label("place")).where(slim.c.turn == 1)
-    rows = board.cte("board")
-    mine = sa.select(rows.c.place).where(rows.c.user_id == (user_id or 0)).scalar_subquery()
-    near = sa.func.abs(rows.c.place - mine) <= AROUND
+    order = [slim.c[name] for name in names]
+    place = sa.func.rank().over(order_by=order)
+    line = sa.func.row_number().over(order_by=[*order, slim.c.id])
+    columns = (slim.c.id, slim.c.user_id, slim.c.first_key, place.label("place"), line.label("line"))
+    rows = sa.select(*columns).where(slim.c.turn == 1).cte("board")
+    mine = sa.select(rows.c.line).where(rows.c.user_id == (user_id or 0)).scalar_subquery()
+    my_place = sa.select(rows.c.place).where(rows.c.user_id == (user_id or 0)).scalar_subquery()
     query = sa.select(
         rows.c.place,
+        rows.c.line,
         *(getattr(Submission, name) for name in ("id", "user_id", *COLUMNS)),
         User.name,
         sa.select(sa.func.count()).select_from(rows).scalar_subquery().label("entrants"),
         sa.select(sa.func.count()).where(rows.c.first_key < NONE).scalar_subquery().label("ranked"),
         sa.select(sa.func.min(rows.c.first_key)).where(rows.c.first_key < NONE).scalar_subquery().label("first"),
+        sa.select(sa.func.count()).where(rows.c.place > my_place).scalar_subquery().label("behind"),
     )
     query = query.join(Submission, Submission.id == rows.c.id).join(User, User.id == rows.c.user_id)
-    found: list[Any] = list(
-        session.execute(query.where(sa.or_(rows.c.place <= top, near)).order_by(rows.c.place, rows.c.id))
-    )
-    lines = list(_lines(found))
-    own = next((line for line, one in lines if one.user_id == user_id), None)
-    shown = [_row(line, one) for line, one in lines if line <= top or (own and abs(line - own) <= AROUND)]
+    is_near = sa.func.abs(rows.c.line - mine) <= AROUND
+    found: list[Any] = list(session.execute(query.where(sa.or_(rows.c.line <= top, is_near)).order_by(rows.c.line)))
     return Board(
-        rows=shown,
+        rows=[_row(one) for one in found],
         entrants=found[0].entrants if found else 0,
         ranked=found[0].ranked if found else 0,
         first_ms=found[0].first if found else None,
+        behind=found[0].behind if found else 0,
     )
-
-
-def _lines(found: list[Any]) -> Iterator[tuple[int, Any]]:
-    """Rows with their numbers: of equals, who share a place, all were found, who was first before the others."""
-    for place, equals in itertools.groupby(found, key=lambda one: one.place):
-        yield from enumerate(equals, start=place)
 
 
 def _order(table: Any) -> list[sa.ColumnElement[Any]]:
@@ -109,14 +104,14 @@ def _order(table: Any) -> list[sa.ColumnElement[Any]]:
     ]
 
 
-def _row(line: int, found: Any) -> Row:
+def _row(found: Any) -> Row:
     return Row(
         submission=found.id,
         user=found.user_id,
         name=found.name,
         model=found.model,
         place=found.place if found.score_ms is not None else None,
-        row=line,
+        row=found.line,
         score_ms=found.score_ms,
         best_lap_ms=found.best_lap_ms,
         resets=found.resets,

@@ -52,12 +52,13 @@ def board_of(session: Session, race: Race, *, user_id: int | None, top: int) -> 
         )
         for number, (finalist, submission, name) in enumerate(found, start=1)
     ]
-    own = next((row.row for row in rows if row.user == user_id), None)
+    mine = next((row for row in rows if row.user == user_id), None)
     return Board(
-        rows=[row for row in rows if row.row <= top or (own is not None and abs(row.row - own) <= AROUND)],
+        rows=[row for row in rows if row.row <= top or (mine is not None and abs(row.row - mine.row) <= AROUND)],
         entrants=len(rows),
         ranked=sum(row.place is not None for row in rows),
         first_ms=None,
+        behind=sum((row.place or row.row) > (mine.place or mine.row) for row in rows) if mine is not None else 0,
     )
 
 

@@ -18,7 +18,7 @@ from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, In
 from racecraft.serve.races.replays import replay_of, trial_of
 from racecraft.serve.races.schemas import MAX_CARS, RaceReplay
 from racecraft.serve.schemas import RunName
-from racecraft.serve.submissions.board import Row
+from racecraft.serve.submissions.board import Board, Row
 from racecraft.serve.submissions.data import data_of
 from racecraft.serve.submissions.infos import seconds_of
 from racecraft.serve.submissions.schemas import (
@@ -124,7 +124,7 @@ def get_board(race_id: Id, request: Request, consoles: InLeague, top: Top = 100)
         running=running,
         rows=[_row(row, first=board.first_ms, is_me=row is mine, medals=medals) for row in board.rows],
         mine=mine.row if mine is not None else None,
-        beaten=_beaten(mine, board.entrants),
+        beaten=_beaten(mine, board),
     )
 
 
@@ -295,8 +295,8 @@ def _row(row: Row, *, first: int | None, is_me: bool, medals: Medals | None) -> 
     )
 
 
-def _beaten(mine: Row | None, entrants: int) -> float | None:
+def _beaten(mine: Row | None, board: Board) -> float | None:
     """Per cent of the others; None for who is alone."""
-    if mine is None or entrants < 2:
+    if mine is None or board.entrants < 2:
         return None
-    return round(100 * (entrants - (mine.place or mine.row)) / (entrants - 1), 1)
+    return round(100 * board.behind / (board.entrants - 1), 1)
