@@ -274,6 +274,19 @@ def test_a_damaged_run_folder_hides_only_itself(console: RunningConsole) -> None
     error(console.client.get("/api/models/damaged"), 404)
 
 
+def test_a_history_that_no_training_wrote_hides_no_other_model(console: RunningConsole) -> None:
+    """An archive brings its own along."""
+    name = console.create(name="strange", train=False, track="oval")
+    history = console.runs / name / "metrics" / "history.jsonl"
+    history.parent.mkdir(exist_ok=True)
+    for seconds in ("x", [1], {"a": 1}, True, 2.5):
+        with history.open("a") as file:
+            file.write(json.dumps({"kind": "iteration", "step": 512, "seconds": seconds}) + "\n")
+    listed = console.client.get("/api/models")
+    assert listed.status_code == 200, listed.text
+    assert {model["name"]: model["seconds"] for model in listed.json()}[name] == 2.5
+
+
 def test_runs_of_the_command_line_appear(console: RunningConsole) -> None:
     from racecraft.agent import ModelMetadata, action_space
     from racecraft.reward import load_preset

@@ -125,6 +125,10 @@ def test_stretches_travel_in_an_archive_and_damaged_ones_are_told(tiny: Train, t
     (tmp_path / "kept.tar.gz").write_bytes(b"".join(archive_chunks(folder)))
     there = RunFolder(import_run(tmp_path / "kept.tar.gz", root=tmp_path / "there").run)
     assert read_stretches(there) == read_stretches(folder)
+    whole = json.loads((folder.stretches / "2.json").read_text())
+    (folder.stretches / "2.json").write_text(json.dumps({**whole, "began": "yesterday"}))
+    with pytest.raises(RunError, match=r"2\.json cannot be read: Invalid isoformat"):
+        read_stretches(folder)
     (folder.stretches / "2.json").write_text('{"format": 1, "number": 2}')
     with pytest.raises(RunError, match=r"2\.json cannot be read"):
         read_stretches(folder)

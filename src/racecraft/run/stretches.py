@@ -189,6 +189,7 @@ def _parsed(document: dict[str, Any]) -> Stretch:
     for name, kind in kinds:
         if not isinstance(getattr(stretch, name), kind):
             raise TypeError(f"{name} is {getattr(stretch, name)!r:.60}")
+    datetime.fromisoformat(stretch.began)
     return stretch
 
 

@@ -19,6 +19,7 @@ import sqlalchemy as sa
 from sqlalchemy.dialects import sqlite
 from sqlalchemy.orm import Session
 
+from racecraft.checks import is_number
 from racecraft.errors import RacecraftError, RunError
 from racecraft.limits import known_limit
 from racecraft.run import RunFolder, RunInfo, Stretch, best_of, judged_laps, list_runs, read_stretches, stretch_at
@@ -414,7 +415,8 @@ def _seconds(folder: RunFolder) -> float:
     except OSError:
         return 0.0
     points, _ = read_history(folder.history, offset=max(0, size - 4096))
-    return max((float(point.get("seconds") or 0.0) for point in points), default=0.0)
+    known = (point for point in points if is_number(point.get("seconds")))  # an archive's may say anything
+    return max((float(point["seconds"]) for point in known), default=0.0)
 
 
 _FRESH: Final[dict[str, Any]] = {"tags": [], "fingerprint": "", "summary": {}}
