@@ -170,6 +170,21 @@ def test_maps_count_where_cars_were(tmp_path: Path, oval: Track) -> None:
     assert not draw_maps(oval, tmp_path, []).rows
 
 
+def test_an_action_that_nobody_has_takes_no_memory(tmp_path: Path, oval: Track) -> None:
+    """A table of every number up to that of a stranger's trace would fill it."""
+    write_trace(tmp_path / "0-iteration.csv", oval, [(2.0, "lap_complete", 1.0)])
+    path = tmp_path / "0-iteration.csv"
+    header, *rows = path.read_text().splitlines()
+    fields = [row.split(",") for row in rows]
+    for row in fields[len(fields) // 2 :]:
+        row[7] = "70000"
+    path.write_text("\n".join([header, *map(",".join, fields)]) + "\n")
+    maps = draw_maps(oval, tmp_path, [0])
+    assert maps.rows
+    assert len(maps.usage) < 10
+    assert maps.usage.sum() == pytest.approx(1.0)
+
+
 def test_what_is_no_trace_is_told(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("a,b\n1,2\n")
     with pytest.raises(RunError):

@@ -85,6 +85,33 @@ def test_a_run_that_was_never_trained_has_a_report_too(run: Path, tmp_path: Path
     assert "<h2>Learning</h2>" not in text
 
 
+def test_curves_and_rewards_that_no_training_wrote_leave_a_report(run: Path, tmp_path: Path) -> None:
+    """An archive brings its own along."""
+    again = tmp_path / "again"
+    shutil.copytree(run, again)
+    points: list[dict[str, object]] = [
+        {"kind": "iteration", "step": 1, "seconds": "x", "reward": 1},
+        {"kind": "iteration", "step": 1, "seconds": 1e308, "reward": 1},
+        *(
+            {"kind": "evaluation", "step": 1, "seconds": 2, "completions": c}
+            for c in (["a"], {"a": 1}, [[1], [1, 2]], 5)
+        ),
+        {"kind": "iteration", "step": 1, "seconds": 3, "reward": 1e308, "entropy": -1e308},
+        {"kind": "iteration", "step": 1, "seconds": 3, "reward": -1e308, "entropy": 1e308},
+        {"kind": "iteration", "step": 2, "seconds": 4, "reward": 2, "completion": 0.5},
+    ]
+    (again / "metrics" / "history.jsonl").write_text("".join(json.dumps(point) + "\n" for point in points))
+    for trace in (again / "training-simtrace").iterdir():
+        lines = [line.split(",") for line in trace.read_text().splitlines()]
+        for line in lines[1:]:
+            line[8] = "1e308"
+        trace.write_text("".join(",".join(line) + "\n" for line in lines))
+    text = write_report(again).read_text()
+    assert "<h2>Learning</h2>" in text
+    for picture in re.findall(r"<svg.*?</svg>", text, re.DOTALL):
+        assert "nan" not in picture
+
+
 def test_what_cannot_be_reported_is_told(run: Path, tmp_path: Path) -> None:
     with pytest.raises(RunError, match="There is no run"):
         write_report(tmp_path / "none")
@@ -129,6 +156,14 @@ def _three_flying_laps(folder: Path) -> Path:
     driven = evaluate(driver, load_track("oval"), rules=rules, num_trials=1, sees="state", num_threads=1)
     write_simtrace(driven, folder, action_space=action_space("continuous"))
     return folder / "0-iteration.csv"
+
+
+def test_a_single_large_number_is_a_chart_too() -> None:
+    text = line_chart(
+        Chart(curves=[Curve(label="a", x=np.array([1e11]), y=np.array([1e11]))], x_label="x", y_label="y")
+    )
+    assert "nan" not in text
+    assert "inf" not in text
 
 
 @pytest.mark.parametrize(

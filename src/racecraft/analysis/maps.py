@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.agent.action_space import MAX_ACTIONS
 from racecraft.analysis.laps import MAX_ROWS
 from racecraft.errors import RunError
 from racecraft.run.simtrace import read_simtrace
@@ -24,6 +25,8 @@ MAX_PLACES: Final = 160
 EDGES: Final = np.array([-1.3, -1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.3])
 """Across: share of half the road's width, left positive; beyond 1 is beside the road  (O + 1,)."""
 EXITS: Final = ("off_track", "crashed", "immobilized", "reversed")
+LARGEST: Final = 1e12
+"""Of any number that is shown; a stranger's trace may say more, and sums of such ones are infinite."""
 SAME_LENGTH: Final = 0.05
 """m by which the track length of a row may differ: rows of a run's other tracks are left out."""
 
@@ -92,13 +95,12 @@ def draw_maps(track: Track, folder: Path, iterations: Sequence[int]) -> TrackMap
         column = np.clip(np.searchsorted(EDGES, share, side="right") - 1, 0, shape[1] - 1)
         cell = (row, column)
         np.add.at(visits, cell, 1.0)
-        np.add.at(rewards, cell, columns["reward"][is_ours])
-        np.add.at(speeds, cell, columns["throttle"][is_ours])
-        np.add.at(steering, cell, np.radians(columns["steer"][is_ours]))
+        for name, total in (("reward", rewards), ("throttle", speeds), ("steer", steering)):
+            np.add.at(total, cell, columns[name][is_ours].clip(-LARGEST, LARGEST))
         actions = columns["action"]
         if actions.ndim == 1:
             for action in np.unique(actions[is_ours]).tolist():
-                if action >= 0:
+                if 0 <= action < MAX_ACTIONS:  # a stranger's trace may say any number
                     counted = counts.setdefault(int(action), np.zeros(shape))
                     which = actions[is_ours] == action
                     np.add.at(counted, (row[which], column[which]), 1.0)
@@ -107,7 +109,7 @@ def draw_maps(track: Track, folder: Path, iterations: Sequence[int]) -> TrackMap
         episodes += len(np.unique(columns["episode"][is_ours]))
         rows += len(points)
     with np.errstate(invalid="ignore", divide="ignore"):
-        means = [total / visits for total in (rewards, speeds, steering)]
+        means = [total / visits for total in (rewards, speeds, np.radians(steering))]
     action, usage = _most_used(counts, shape)
     return TrackMaps(
         grid=_grid(track, places),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from racecraft.analysis.corners import passages, sectors_of
 from racecraft.analysis.laps import TracedLap, driven_direction, read_laps
 from racecraft.analysis.learned import bands, checkpoint_table, rewards, stretch_table
-from racecraft.analysis.maps import draw_maps, iterations_of
+from racecraft.analysis.maps import LARGEST, draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
 from racecraft.checks import is_number
@@ -203,7 +203,7 @@ def _learning(points: list[dict[str, Any]], stretches: Sequence[Stretch]) -> str
     seconds = np.array([_number(point.get("seconds")) for point in iterations])
     unit, x_label = (1.0, "seconds of training") if seconds[-1] < 180 else (60.0, "minutes of training")
     parts = bands(stretches, iterations, unit)
-    judged = [np.mean(point.get("completions") or [math.nan]) for point in evaluations]
+    judged = [_mean(point.get("completions")) for point in evaluations]
     best = next((point for point in reversed(evaluations) if point.get("is_best")), None)
     charts = [
         Chart(
@@ -301,7 +301,8 @@ def _history(folder: RunFolder) -> list[dict[str, Any]]:
         page_of_points, end = read_history(folder.history, offset=offset)
         if end <= offset:
             break
-        points, offset = points + page_of_points, end
+        points += [point for point in page_of_points if not math.isnan(_number(point.get("seconds")))]
+        offset = end
     return points
 
 
@@ -318,7 +319,13 @@ def _column(points: Iterable[dict[str, Any]], name: str) -> NDArray[np.float64]:
 
 
 def _number(value: Any) -> float:
-    return float(value) if is_number(value) else math.nan
+    return float(value) if is_number(value) and abs(value) < LARGEST else math.nan
+
+
+def _mean(values: Any) -> float:
+    """Of what in a list is a number."""
+    known = [float(value) for value in values if is_number(value)] if isinstance(values, list) else []
+    return sum(known) / len(known) if known else math.nan
 
 
 def _seconds(value: Any) -> str:

@@ -71,7 +71,8 @@ def line_chart(chart: Chart) -> str:
         return ""
     xs = np.concatenate([curve.x for curve in known])
     ys = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in known])
-    x_low, x_high = float(xs.min()), float(max(xs.max(), xs.min() + 1e-9))
+    x_low = float(xs.min())
+    x_high = _above(x_low, float(xs.max()))
     y_low, y_high = chart.y_range or _padded(float(ys.min()), float(ys.max()))
     field_width, field_height = WIDTH - LEFT - RIGHT, chart.height - TOP - BOTTOM
 
@@ -181,7 +182,7 @@ def cell_map(track: Track, grid: Floats, values: Floats, label: str, exits: Floa
     if not len(known):
         return ""
     low, high = np.quantile(known, [0.02, 0.98]).tolist()
-    high = max(high, low + 1e-9)
+    high = _above(low, high)
     parts = []
     for place, across in np.argwhere(np.isfinite(values)).tolist():
         corners = [grid[place, across], grid[place, across + 1], grid[place + 1, across + 1], grid[place + 1, across]]
@@ -244,6 +245,11 @@ def _path(curve: Curve, px: Callable[[float], float], py: Callable[[float], floa
         points.append(f"{pen}{px(x):.1f} {py(y):.1f}")
         pen = "L"
     return "".join(points)
+
+
+def _above(low: float, high: float) -> float:
+    """The upper end of a scale, above the lower one however large that is."""
+    return max(high, low + 1e-9 * max(1.0, abs(low)))
 
 
 def _padded(low: float, high: float) -> tuple[float, float]:
