@@ -24,6 +24,10 @@ RATIO: Final = 1.2
 MAX_BYTES: Final = 1 << 23
 """That are read; sixty laps of a minute are one million."""
 MAX_POSES: Final = 3000
+MAX_PLACE: Final = 10**9
+"""mm and mrad; tracks lie within 10 km of their origin."""
+MAX_STEP: Final = 1000
+"""mm along x or y between two poses; a car drives 270."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,6 +101,10 @@ def _drive(point: dict[str, Any]) -> Drive | None:
             check_number("lap_time", lap_time, 0.0)
         if poses.dtype != np.int64 or poses.ndim != 2 or poses.shape[1] != 3 or not 2 <= len(poses) <= MAX_POSES:
             return None
+        if poses.min() < -MAX_PLACE or poses.max() > MAX_PLACE:
+            return None
+        if np.abs(np.diff(poses[:, :2], axis=0)).max() > MAX_STEP:
+            return None  # a film would draw the way there, dot by dot
         return Drive(
             step=int(point["step"]),
             lap_time=None if lap_time is None else float(lap_time),
