@@ -80,6 +80,23 @@ def test_resumed_run_continues_the_file_from_its_checkpoint(tmp_path):
     assert lines[-1]["episode_status"] == "Crashed"
 
 
+def test_a_resumed_run_keeps_no_lines_that_no_training_wrote(tmp_path):
+    """An archive's file may be an evaluation's, or anybody's."""
+    first = TrainingMetrics(tmp_path / "m.json", interval_s=0)
+    first.add(episode(0))
+    first.write()
+    document = read_metrics(first.path)
+    (line,) = document["metrics"]
+    for name in ("episode", "metric_time", "phase"):
+        document["metrics"].append({key: value for key, value in line.items() if key != name})
+        document["metrics"].append({**line, name: "1"})
+        document["metrics"].append({**line, name: [1]})
+    first.path.write_text(json.dumps(document))
+    second = TrainingMetrics(first.path, episodes=6, clock=100.0, interval_s=0)
+    second.write()
+    assert read_metrics(second.path)["metrics"] == [line]
+
+
 def test_very_long_runs_are_thinned_evenly(tmp_path, monkeypatch):
     monkeypatch.setattr("racecraft.run.metrics.MAX_EPISODES", 100)
     metrics = TrainingMetrics(tmp_path / "m.json", interval_s=1e9)

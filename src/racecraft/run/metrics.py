@@ -7,8 +7,9 @@ import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
+from racecraft.checks import is_number
 from racecraft.errors import RunError
 from racecraft.json_file import read_json_object
 from racecraft.run.atomic import write_file
@@ -67,7 +68,7 @@ class TrainingMetrics:
         self._lines = [
             (line["episode"], line["phase"], json.dumps(line))
             for line in kept
-            if line["episode"] <= episodes and line["metric_time"] <= end
+            if _is_ours(line) and line["episode"] <= episodes and line["metric_time"] <= end
         ]
         self._stride = 1
         self._episodes = episodes
@@ -167,6 +168,12 @@ def read_metrics(path: Path) -> dict[str, Any]:
     if not isinstance(lines, list) or not all(isinstance(line, dict) and "trial" in line for line in lines):
         raise RunError(f"{path} is not a metrics file: it has no list of trials under 'metrics'.")
     return document
+
+
+def _is_ours(line: dict[str, Any]) -> bool:
+    """Whether a line is one that a training writes, and not of an evaluation's file or a stranger's archive."""
+    numbers = (line.get("episode"), line.get("metric_time"))
+    return all(map(is_number, numbers)) and line.get("phase") in get_args(Phase)
 
 
 def _percent(progress: float) -> int:
