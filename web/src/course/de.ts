@@ -3,7 +3,7 @@ import type { CourseKey } from "./en";
 
 export const de: Record<CourseKey, string> = {
   title: "Lernen im Rennen",
-  lead: "Zwölf Lektionen, von „Was ist eine Belohnung“ bis zu einem Fahrer, der aus Pixeln gelernt hat. Jede hat Text, Code, der in Sekunden läuft, etwas zum Spielen, Übungen und Fragen.",
+  lead: "Zwölf Lektionen, von „Was ist eine Belohnung“ bis zu einem Fahrer, der aus Pixeln gelernt hat. Jede hat Text, Code, der in Sekunden läuft, Übungen und Fragen; sechs haben etwas zum Spielen.",
   read_of: "{read} von {count} gelesen",
   answered_of: "Fragen: {share} richtig",
   solved_of: "{solved} von {count} Übungen gelöst",

@@ -1,7 +1,7 @@
 /** English texts of the course: the complete catalogue. */
 export const en = {
   title: "Learn by racing",
-  lead: "Twelve lessons, from “what is a reward” to a driver that learned from pixels. Each is text, code that runs in seconds, something to play with, exercises and a quiz.",
+  lead: "Twelve lessons, from “what is a reward” to a driver that learned from pixels. Each is text, code that runs in seconds, exercises and a quiz; six have something to play with.",
   read_of: "{read} of {count} read",
   answered_of: "quizzes: {share} right",
   solved_of: "{solved} of {count} exercises solved",
