@@ -93,6 +93,27 @@ BAD_NAMES = {
 }
 
 
+def windows_zip(*names: str) -> bytes:
+    """As Compress-Archive of Windows PowerShell makes it."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in names:
+            info = zipfile.ZipInfo(name)
+            info.create_system = 0
+            archive.writestr(info, name.encode() if not name.endswith("\\") else b"")
+    return buffer.getvalue()
+
+
+def test_a_zip_of_windows_has_its_files_in_their_folders(tmp_path: Path) -> None:
+    names = ("my-car\\", "my-car\\model\\model_metadata.json", "my-car\\reward_function.py")
+    assert set(read(windows_zip(*names), tmp_path)) == {"my-car/model/model_metadata.json", "my-car/reward_function.py"}
+    for name, says in (("a\\..\\evil", "leads out"), ("\\evil", "absolute"), ("C:\\evil", "absolute")):
+        with pytest.raises(ArchiveError, match=says):
+            read(windows_zip(name), tmp_path)
+    with pytest.raises(ArchiveError, match="twice"):
+        read(windows_zip("a\\b", "a/b"), tmp_path)
+
+
 @pytest.mark.parametrize(("name", "says"), BAD_NAMES.items(), ids=[ascii(name)[:20] for name in BAD_NAMES])
 def test_names_that_lead_elsewhere(name: str, says: str, tmp_path: Path) -> None:
     for data in (make_tar({name: b""}, format=tarfile.GNU_FORMAT), make_tar({name: b""}), make_zip({name: b""})):

@@ -22,6 +22,7 @@ MAX_DIRECTORY: Final = 1 << 24  # bytes
 STORED, DEFLATED = 0, 8
 _ENCRYPTED: Final = 1 << 0 | 1 << 6 | 1 << 13
 _UTF8: Final = 1 << 11
+_WINDOWS: Final = (0, 10)  # FAT, NTFS
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,7 @@ class _Entry:
     crc: int
     packed: int
     size: int
+    host: int
     mode: int
     offset: int
 
@@ -145,8 +147,9 @@ def _directory(file: BinaryIO, guard: Guard) -> tuple[list[_Entry], int]:
             guard.refuse("is a zip64 archive, for more than a model needs")
         begin = position + ENTRY.size
         position = begin + name + extra + comment
-        mode = attributes >> 16 if made_by >> 8 in (3, 19) else 0  # Unix, macOS
-        entries.append(_Entry(data[begin : begin + name], flags, method, crc, packed, unpacked, mode, at))
+        host = made_by >> 8
+        mode = attributes >> 16 if host in (3, 19) else 0  # Unix, macOS
+        entries.append(_Entry(data[begin : begin + name], flags, method, crc, packed, unpacked, host, mode, at))
     if position != length:
         guard.refuse("is damaged: its list of members has another length than it says")
     return sorted(entries, key=lambda entry: entry.offset), offset
@@ -192,9 +195,9 @@ def _data_offset(file: BinaryIO, entry: _Entry, guard: Guard) -> int:
 
 
 def _name(entry: _Entry, guard: Guard) -> str:
-    if not entry.flags & _UTF8:
-        return entry.name.decode("cp437")
     try:
-        return entry.name.decode()
+        name = entry.name.decode() if entry.flags & _UTF8 else entry.name.decode("cp437")
     except UnicodeDecodeError:
         guard.refuse(f"has a name that is not UTF-8, {entry.name[:60]!a}")
+    # Compress-Archive of Windows PowerShell parts folders as Windows does, where no name has a backslash in it
+    return name.replace("\\", "/") if entry.host in _WINDOWS else name
