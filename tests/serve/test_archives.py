@@ -92,6 +92,12 @@ def test_a_model_of_deepracer_becomes_a_model(console: RunningConsole, pack: Any
     error(upload(console, "x.tar.gz", tar_of(AWS_MODEL), name=name), 409)
 
 
+def test_a_second_download_has_its_number_before_the_last_ending(console: RunningConsole) -> None:
+    done = upload(console, "my-car.tar(1).gz", tar_of(AWS_MODEL))
+    assert done.status_code == 201, done.text
+    assert done.json()["model"]["name"].startswith("my-car")
+
+
 def test_a_reward_function_becomes_a_model(console: RunningConsole) -> None:
     done = upload(console, "C:\\Users\\me\\my best reward.py", REWARD.encode(), track="oval")
     assert done.status_code == 201, done.text

@@ -26,7 +26,8 @@ from racecraft.serve.settings import PEOPLE, STATE_FOLDER, ServeSettings
 
 router = APIRouter(prefix="/api/models", tags=["archives"])
 
-ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".py")
+ENDINGS: Final = (".tar.gz", ".tgz", ".tar", ".zip", ".gz", ".py")
+"""``.gz`` alone is what a browser makes of a second download: ``model.tar(1).gz``."""
 UPLOADS: Final = "uploads"  # inside the state folder
 ABANDONED: Final = 3600.0  # s without a byte after which an upload is one of a server that was killed
 ARRIVES_S: Final = 1800.0
