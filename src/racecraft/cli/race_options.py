@@ -92,9 +92,13 @@ def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str
     """The race as far as its objects go, and the other cars of a head-to-head race.
 
     Raises:
-        ConfigError: An option does not go with the race, or has no meaning.
+        ConfigError: There is no such race, or an option does not go with it, or has no meaning.
     """
+    from racecraft.checks import check_choice
+    from racecraft.sim.objects import RACE_TYPES
+
     name = kind_of(race)
+    check_choice("Race type", name, (*RACE_TYPES, "head-to-head"))
     for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars != 0)):
         if is_given and name != "head-to-head":
             raise ConfigError(f"{option} goes with --race head-to-head; the race is {name}.")
