@@ -95,6 +95,24 @@ def test_an_experiment_has_its_model_where_all_others_have_theirs(tmp_path: Path
     assert (alone.used["model/model_1.pb"], alone.kept) == ("weights of the policy", plain.kept)
 
 
+def test_a_bucket_is_its_model_and_not_what_trains_next(tmp_path: Path) -> None:
+    """As 'aws s3 sync' copies it: the weights must not be lost beside custom_files."""
+    model = {f"my-model/{name}": text for name, text in {**models.MODEL, **models.WEIGHTS}.items()}
+    bucket = models.as_folder({**model, "custom_files/reward_function.py": "other = 1\n"}, tmp_path / "bucket")
+    found = import_run(bucket, name="of-bucket")
+    assert found.track == "oval"
+    assert found.used["model/model_8.pb"] == "weights of the policy"
+    assert RunFolder.open(found.run).read_reward_function() == models.REWARD
+    assert any(note.startswith("custom_files/ was left out") for note in found.notes)
+    assert not any("custom_files" in note for note in import_run(bucket / "my-model", name="alone").notes)
+    models.as_folder({name.replace("my", "your"): text for name, text in model.items()}, bucket)
+    with pytest.raises(SourceError, match="holds 2 models: 'my-model', 'your-model'"):
+        import_run(bucket, name="two")
+    kept = {f"old/{name}": text for name, text in models.MODEL.items() if name != "training_params.yaml"}
+    drafts = models.as_folder({**kept, "custom_files/reward_function.py": models.REWARD}, tmp_path / "drafts")
+    assert "custom_files/reward_function.py" in import_run(drafts, name="drafts").used
+
+
 def test_what_only_awss_console_refused_comes_along_with_a_note(tmp_path: Path) -> None:
     limits = {"steering_angle": {"low": -20, "high": 20}, "speed": {"low": 1, "high": 2}}
     wide = {"num_epochs": 2, "batch_size": 1024, "lr": 0.01, "loss_type": "Huber", "exploration_type": "e-greedy"}

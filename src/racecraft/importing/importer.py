@@ -123,6 +123,11 @@ def import_run(
     with ExitStack() as stack:
         source = stack.enter_context(open_source(path))
         model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))
+        outer = re.sub(r"[^/]+/$", "", model.root)
+        if model.root and any(file.startswith(f"{outer}{CUSTOM_FILES}/") for file in source.files):
+            model.notes.append(
+                f"{outer}{CUSTOM_FILES}/ was left out, as it is for the next training, not of this model."
+            )
         params, given = _read_params(model)
         is_foreign = not reward and bool(source.reward or model.find(REWARD))
         model.weights = _find_weights(model, checkpoint, network)

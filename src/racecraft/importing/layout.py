@@ -88,14 +88,14 @@ def find_root(names: Iterable[str], *, source: str) -> str:
     Raises:
         SourceError: There are several models, or nothing that is understood.
     """
-    roots: dict[str, bool] = {}  # folder -> is there a reward function
+    roots: dict[str, set[str]] = {}  # folder -> what there marks it
     has_history = False
     for name in names:
         has_history = has_history or role(name) in ("trace", "metrics", "weights", "log")
         for mark in _MARKS:
             if name == mark or name.endswith(f"/{mark}"):
                 root = name[: -len(mark)]
-                roots[root] = roots.get(root, False) or mark.endswith(REWARD)
+                roots.setdefault(root, set()).add(mark)
                 break
     if not roots:
         if has_history:
@@ -104,11 +104,21 @@ def find_root(names: Iterable[str], *, source: str) -> str:
             f"{source} holds nothing that is understood: neither {REWARD} nor {METADATA} nor {RUN_ENV}.",
             hint="Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
         )
-    own = {root: has for root, has in roots.items() if not set(root.split("/")) & set(_FOLDERS_OF_OTHERS)} or roots
-    candidates = [root for root, has_reward in own.items() if has_reward] or list(own)
+    own = {root: marks for root, marks in roots.items() if not set(root.split("/")) & set(_FOLDERS_OF_OTHERS)} or roots
+    trained = [root for root, marks in own.items() if {REWARD, TRAINING_PARAMS} <= marks]
+    own = {root: marks for root, marks in own.items() if not _is_bucket(root, marks, trained)}
+    candidates = [root for root, marks in own.items() if any(mark.endswith(REWARD) for mark in marks)] or list(own)
     outer = min(root.count("/") for root in candidates)
     found = sorted(root for root in candidates if root.count("/") == outer)
     if len(found) > 1:
         listed = ", ".join(ascii(root.rstrip("/"))[:80] for root in found[:5])
         raise SourceError(f"{source} holds {len(found)} models: {listed}.", hint="Import the folder of one of them.")
     return found[0]
+
+
+def _is_bucket(root: str, marks: Iterable[str], trained: Iterable[str]) -> bool:
+    """Whether a folder is deepracer-for-cloud's bucket: ``custom_files``, for the next training, beside its models."""
+    is_next = all(mark.startswith(f"{CUSTOM_FILES}/") for mark in marks)
+    return is_next and any(
+        model.startswith(root) and model != root and CUSTOM_FILES not in model.split("/") for model in trained
+    )
