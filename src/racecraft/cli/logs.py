@@ -27,7 +27,11 @@ def replay(
     vehicle: Annotated[str, typer.Option("--vehicle", help="v4, v5, v6 or a vehicle file.")] = "v5",
     picture: Annotated[
         Path | None,
-        typer.Option("--picture", "-o", help="Draw the median and the worst window, or the two frames, to this file."),
+        typer.Option(
+            "--picture",
+            "-o",
+            help="File for the median and the worst window, by default replay.png, or for the two frames, by default none.",
+        ),
     ] = None,
     rows: Annotated[
         Path | None, typer.Option("--rows", help="CSV file for every row that comes out otherwise, with both values.")
