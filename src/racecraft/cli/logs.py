@@ -30,7 +30,7 @@ def replay(
         typer.Option(
             "--picture",
             "-o",
-            help="File for the median and the worst window, by default replay.png, or for the two frames, by default none.",
+            help="File for the median and the worst window, by default replay.png; or for the frames, by default none.",
         ),
     ] = None,
     rows: Annotated[
