@@ -5,6 +5,7 @@ Never accepted is a file that says two things at once (duplicate keys), or has n
 
 from __future__ import annotations
 
+import codecs
 import errno
 import json
 import math
@@ -12,6 +13,7 @@ import os
 import stat
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NoReturn
 
@@ -57,16 +59,25 @@ def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
 
 
 def read_text(path: str | Path, *, max_bytes: int = MAX_BYTES, name: str = "") -> str:
-    """As :func:`read_bytes`, of UTF-8 text; a byte order mark is fine.
+    """As :func:`read_bytes`, of UTF-8 text, with or without a byte order mark, or of UTF-16 with one.
 
     Raises:
-        ConfigError: Not readable, too large, or not UTF-8.
+        ConfigError: Not readable, too large, or neither.
     """
-    return decode_text(read_bytes(path, max_bytes=max_bytes, name=name), name=name or str(path))
+    data = read_bytes(path, max_bytes=max_bytes, name=name)
+    if is_utf16(data):
+        with suppress(UnicodeDecodeError):
+            return data.decode("utf-16")
+    return decode_text(data, name=name or str(path))
+
+
+def is_utf16(data: bytes) -> bool:
+    """Whether a file begins as those that a Windows shell's > writes."""
+    return data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
 
 
 def decode_text(data: bytes, *, name: str) -> str:
-    """As :func:`read_text`, from memory; ``name`` is what messages call it."""
+    """UTF-8 text from memory, with or without a byte order mark; ``name`` is what messages call it."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -74,10 +85,10 @@ def decode_text(data: bytes, *, name: str) -> str:
 
 
 def read_json_object(path: str | Path, *, max_bytes: int = MAX_BYTES) -> dict[str, Any]:
-    """The JSON object in a UTF-8 file.
+    """The JSON object in a file of text.
 
     Raises:
-        ConfigError: Not readable, too large, not UTF-8, not a JSON object, or with duplicate keys, NaN or half letters.
+        ConfigError: Not readable, too large, not text, not a JSON object, or with duplicate keys, NaN or half letters.
     """
     return parse_json_object(read_text(path, max_bytes=max_bytes), name=str(path))
 

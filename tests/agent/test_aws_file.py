@@ -24,7 +24,7 @@ from racecraft.json_file import parse_json_object, read_json_object
         (b'{"a": 1e999}', "1e999 is too large"),
         (b'{"a": ' + b"9" * 5000 + b"}", "not valid"),
         (b'{"a": ' + b"[" * 100_000 + b"]" * 100_000 + b"}", "nested too deeply"),
-        (b"\xff\xfe{}", "not UTF-8 text: byte 0 is 0xff"),
+        (b"\xff{}", "not UTF-8 text: byte 0 is 0xff"),
         (b" " * (1 << 20) + b"{}", "larger than 1,048,576 bytes"),
     ],
     ids=range(14),

@@ -165,6 +165,18 @@ def test_a_reward_function_is_read_in_the_encoding_that_it_says(tmp_path: Path) 
     assert RunFolder.open(found.run).read_reward_function() == f"# coding: utf-8, Größe\n{models.REWARD}"
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_settings_are_read_as_a_windows_shell_wrote_them(tmp_path: Path, encoding: str) -> None:
+    """Its > writes UTF-16, and Notepad a mark before UTF-8."""
+    files = {name: text.encode(encoding) for name, text in models.MODEL.items()}
+    found = import_run(models.as_folder(files, tmp_path / "car"), name="car")
+    assert found.track == "oval"
+    assert found.used["model_metadata.json"].startswith("3 actions")
+    (tmp_path / "car" / "model_metadata.json").write_bytes(models.METADATA.encode("utf-16") + b"x")
+    with pytest.raises(RacecraftError, match=r"^model_metadata\.json is not UTF-8 text: byte 0 is 0xff"):
+        import_run(tmp_path / "car", name="cut")
+
+
 def test_a_model_without_weights_needs_a_reward(tmp_path: Path) -> None:
     archive = models.as_tar({"model_metadata.json": models.METADATA}, tmp_path / "model.tar.gz")
     with pytest.raises(SourceError, match=r"has no reward_function\.py") as caught:

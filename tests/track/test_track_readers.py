@@ -261,6 +261,12 @@ def test_wrong_tables(write, text: str, words: str) -> None:
         load_track(write(text, "bad.csv"))
 
 
+def test_a_table_that_a_spreadsheet_saved_as_unicode_text(write) -> None:
+    plain = load_track(write(table(), "plain.csv"))
+    tabs = table().replace(",", "\t").encode("utf-16")
+    assert load_track(write(tabs, "tabs.csv")).digest == plain.digest
+
+
 def test_binary_table(write) -> None:
     with pytest.raises(TrackError, match="UTF-8"):
-        load_track(write(b"\xff\xfe\x00" * 50, "bad.csv"))
+        load_track(write(b"\xff\x00\xfe" * 50, "bad.csv"))

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from racecraft.errors import TrackError, TrackNotFound
-from racecraft.json_file import open_regular
+from racecraft.json_file import is_utf16, open_regular
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.track.polyline import Floats, signed_area
 from racecraft.track.track import CLOSED_GAP, Track
@@ -178,7 +178,7 @@ def _parse_npy(content: bytes, path: Path) -> Floats:
 def _parse_csv(content: bytes, path: Path) -> Floats:
     """The four columns of the table as (W, 4)."""
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode("utf-16" if is_utf16(content) else "utf-8-sig")
     except UnicodeDecodeError:
         raise TrackError(f"{path.name} is not a text file in UTF-8.") from None
     columns: Sequence[int] = (0, 1, 2, 3)
