@@ -235,7 +235,7 @@ class Groups:
         )
         with self._database.transaction() as session:
             if group_id is not None:
-                _hold(session, group_id)  # of two at the same moment the second finds the other's
+                hold_group(session, group_id)  # of two at the same moment the second finds the other's
                 session.execute(sa.delete(Invitation).where(Invitation.group_id == group_id))
             session.add(invitation)
         return Joining(code, uses, invitation.expires)
@@ -331,14 +331,14 @@ def _needs_home(session: Session, user_id: int) -> bool:
     return user.role == "racer" and not user.password and not session.scalar(has_home)
 
 
-def _hold(session: Session, group_id: int) -> None:
-    """Keep others from letting people into a group until the transaction ends, in either database."""
+def hold_group(session: Session, group_id: int) -> None:
+    """Keep others from letting people into a group, and its races from following others, until the transaction ends."""
     session.execute(sa.update(Group).where(Group.id == group_id).values(title=Group.title))
 
 
 def _require_room(session: Session, group_id: int, more: int) -> None:
     """Refuse more members than a group may have; nobody else comes in until the transaction ends."""
-    _hold(session, group_id)
+    hold_group(session, group_id)
     count = session.scalar(sa.select(sa.func.count()).where(Member.group_id == group_id)) or 0
     if count + more > MAX_MEMBERS:
         raise Conflict(f"A group has at most {MAX_MEMBERS} members; this one has {count}.")

@@ -7,7 +7,7 @@ from typing import Literal
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.people.keys import hold_account, require_still_in, revoke_all
 from racecraft.serve.people.names import checked_name, gone_name, handle_of, is_gone_name
@@ -84,6 +84,7 @@ class People:
             Conflict: It is taken, or looks like one that is; or the one that there is stays.
         """
         with self._database.transaction() as session:
+            hold_account(session, user_id)  # or a name that came at the same moment would stay as the organiser's
             user = session.get_one(User, user_id)
             if user.is_moderated and not by_organiser:
                 raise Conflict("Who organises your group gave you this name.", hint="Ask them for another one.")
@@ -153,6 +154,8 @@ class People:
     def remove(self, user_id: int) -> None:
         """Forget somebody: name, keys and groups; their places on boards stay, nameless and out of the race.
 
+        A group that nobody else organises is from then on for whoever holds the league to organise.
+
         Raises:
             Conflict: It is who started the server.
         """
@@ -164,6 +167,7 @@ class People:
             user.name, user.handle, user.password = gone_name(user_id), None, ""
             user.role, user.deleted = "racer", now()
             revoke_all(session, user_id)
+            _hand_over(session, user_id)
             session.execute(sa.delete(Member).where(Member.user_id == user_id))
             session.execute(sa.delete(StudiedLesson).where(StudiedLesson.user_id == user_id))
             session.execute(sa.delete(Comment).where(sa.or_(Comment.owner_id == user_id, Comment.author_id == user_id)))
@@ -196,6 +200,17 @@ def use_invitation(session: Session, code: str) -> Invitation | None:
     if session.execute(taken).rowcount != 1:  # type: ignore[attr-defined]
         return None
     return session.scalars(sa.select(Invitation).where(Invitation.code == code)).one()
+
+
+def _hand_over(session: Session, user_id: int) -> None:
+    """Give the groups that somebody alone organises to whoever holds the league: who came in by one may need a card."""
+    other = aliased(Member)
+    is_shared = sa.exists().where(
+        other.group_id == Member.group_id, other.role == "organiser", other.user_id != user_id
+    )
+    alone = sa.select(Member.group_id).where(Member.user_id == user_id, Member.role == "organiser", ~is_shared)
+    for group_id in session.scalars(alone).all():
+        session.merge(Member(group_id=group_id, user_id=OWNER, role="organiser"))
 
 
 def _flush(session: Session, name: str) -> None:

@@ -22,6 +22,7 @@ from racecraft.errors import RunError
 from racecraft.race.entry_file import read_entry_file
 from racecraft.serve.jobs.queue import KINDS, ORGANISER, kinds_of, new_job
 from racecraft.serve.jobs.turns import waiting_line
+from racecraft.serve.people.keys import hold_account
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import hold, is_withheld, state_of
 from racecraft.serve.races.standings import trial_scores
@@ -77,7 +78,10 @@ class Entries:
         try:
             with self._database.transaction() as session:
                 hold(session, race_id)  # two at the same moment count each other
-                race = session.get_one(Race, race_id)
+                hold_account(session, user_id)  # and what comes while somebody goes does so before them, or not at all
+                race, _, part = seen(session, race_id, user_id)
+                if part == "spectator":
+                    raise NotFound(f"There is no race {race_id} of a group that you are in.")
                 if (state := state_of(race)) != "open":
                     raise Conflict(f"The race is {'not open yet' if state == 'upcoming' else 'over'}.")
                 is_it = sa.and_(Submission.race_id == race_id, Submission.digest == digest)
@@ -155,6 +159,7 @@ class Entries:
         self._league.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
             found = _submission(session, race_id, submission_id)
+            hold_account(session, found.user_id)  # or what is restored while they go stands without them
             if session.get_one(User, found.user_id).deleted is not None:
                 raise Conflict("Who entered this has deleted their account: it stays out.")
             found.disqualified = reason.strip()

@@ -19,6 +19,7 @@ from racecraft.errors import ConfigError, RacecraftError
 from racecraft.limits import Medals
 from racecraft.limits.limit import known_limit
 from racecraft.race.announcement import Announcement
+from racecraft.serve.groups.groups import hold_group
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, hold, is_withheld, state_of
 from racecraft.serve.races.state import car_of, told_car
@@ -123,8 +124,9 @@ class League:
             NotFound: They do not organise it.
             Conflict: Another race takes its drivers from it and would be closed for ever.
         """
-        self.get(race_id, user_id, organiser=True)
+        race = self.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
+            hold_group(session, race.group)  # or another race would follow this one meanwhile
             follows = sa.select(Race.title).where(Race.after_id == race_id, Race.deleted.is_(None))
             if (final := session.scalar(follows.limit(1))) is not None:
                 raise Conflict(f"{final!r} takes its drivers from this race.", hint="Let it follow no race first.")
@@ -143,6 +145,9 @@ class League:
             raise NotFound(f"There is no race {stage.race} in this race's group.")
         with self._database.transaction() as session:
             hold(session, race_id)  # nobody enters meanwhile who did not qualify
+            hold_group(session, race.group)  # nor does that one follow this one, or go
+            if session.get_one(Race, stage.race).deleted is not None:
+                raise NotFound(f"There is no race {stage.race} in this race's group.")
             require_alone(session.get_one(Race, race_id))
             let_follow(session, race_id, stage.race, best=stage.best)
 
