@@ -79,6 +79,33 @@ def test_a_drfc_folder(tmp_path: Path) -> None:
     assert report["used"] == found.used
 
 
+@pytest.mark.parametrize("pack", [models.as_folder, models.as_tar])
+def test_files_that_run_env_names_may_lie_in_folders_of_custom_files(tmp_path: Path, pack: Any) -> None:
+    keys = {
+        "REWARD": "$DR_LOCAL_S3_CUSTOM_FILES_PREFIX/rewards/fast.py",
+        "MODEL_METADATA": "custom_files/cars/slow.json",
+        "HYPERPARAMETERS": "my-prefix/of-mine/ppo.json",
+    }
+    env = "".join(f"DR_LOCAL_S3_{name}_KEY={key}\n" for name, key in keys.items())
+    slow = models.METADATA.replace('"speed": 1.0', '"speed": 0.5')
+    named = {
+        "run.env": f"{models.DRFC['run.env']}{env}",
+        "custom_files/rewards/fast.py": f"# fast\n{models.REWARD}",
+        "custom_files/cars/slow.json": slow,
+        "custom_files/ppo.json": models.HYPERPARAMETERS.replace("64", "32"),
+    }
+    own = {name: text for name, text in models.DRFC.items() if not name.startswith("data/")}
+    found = import_run(pack({**own, **named}, tmp_path / "drfc.tar"), name="named")
+    folder = RunFolder.open(found.run)
+    assert folder.read_reward_function().startswith("# fast")
+    assert folder.read_model_metadata().action_space.most_speed == 0.5
+    parameters = folder.read_hyperparameters()
+    assert parameters is not None
+    assert parameters.batch_size == 32
+    assert found.used[f"DR_LOCAL_S3_REWARD_KEY={keys['REWARD']}"] == "custom_files/rewards/fast.py"
+    assert found.used[f"DR_LOCAL_S3_HYPERPARAMETERS_KEY={keys['HYPERPARAMETERS']}"] == "custom_files/ppo.json"
+
+
 def test_an_experiment_has_its_model_where_all_others_have_theirs(tmp_path: Path) -> None:
     of_all = ("data/", "system.env")
     files = {name if name.startswith(of_all) else f"experiments/e-1/{name}": text for name, text in models.DRFC.items()}

@@ -48,7 +48,7 @@ FILES: Final = {
     "DR_LOCAL_S3_MODEL_METADATA_KEY": METADATA,
     "DR_LOCAL_S3_HYPERPARAMETERS_KEY": HYPERPARAMETERS,
 }
-"""Settings that say which file of ``custom_files`` is meant: their last part counts."""
+"""Settings that say which file of ``custom_files`` is meant: what follows their first part counts."""
 
 MODEL_PREFIX: Final = "DR_LOCAL_S3_MODEL_PREFIX"
 PRETRAINED: Final = "DR_LOCAL_S3_PRETRAINED"
@@ -143,7 +143,7 @@ class DrfcSettings:
     rules_given: dict[str, str]
     """Rules that were given, and as what."""
     files: dict[str, str]
-    """Which file of ``custom_files`` stands for which of ours."""
+    """Which file of ``custom_files`` stands for which of ours; perhaps its last part alone is what lies there."""
     used: dict[str, str]
     """Other settings that have a meaning, and what each becomes."""
     prefix: str
@@ -271,13 +271,15 @@ def _rules(values: Mapping[str, str], *, name: str) -> tuple[RaceRules | None, d
 
 
 def _files(values: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
-    """Which files of ``custom_files`` are meant, by the last part of their keys; the first part may be a variable."""
+    """Which files of ``custom_files`` are meant, by what follows the first part of their keys, often a variable."""
     files, used = {}, {}
     for key, file in FILES.items():
-        base = values.get(key, "").rpartition("/")[2]
-        if base and "$" not in base and "`" not in base:
-            files[file] = base
-            used[f"{key}={values[key]}"] = f"{CUSTOM_FILES}/{base}"
+        parts = values.get(key, "").split("/")
+        plain = parts[max((n for n, part in enumerate(parts) if "$" in part or "`" in part), default=-1) + 1 :]
+        place = "/".join(plain[1:] if len(plain) == len(parts) > 1 else plain)
+        if plain and plain[-1]:
+            files[file] = place
+            used[f"{key}={values[key]}"] = f"{CUSTOM_FILES}/{place}"
         elif key in values:
             used[f"{key}={values[key]}"] = f"cannot be resolved: {CUSTOM_FILES}/{file}"
     return files, used

@@ -209,10 +209,16 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
             tuple(note for file in read for note in file.notes),
         )
         drfc = model.drfc = read_drfc(env, name=RUN_ENV)
-        for aws, place in drfc.files.items():
-            if place != aws and f"{model.root}{CUSTOM_FILES}/{place}" not in source.files:
-                raise SourceError(f"run.env names {place!r} as the {aws}, but {CUSTOM_FILES}/{place} is not there.")
         model.used.update(drfc.used)
+        for aws, place in list(drfc.files.items()):
+            base = place.rpartition("/")[2]
+            there = [one for one in (place, base) if f"{model.root}{CUSTOM_FILES}/{one}" in source.files]
+            if not there and base != aws:
+                raise SourceError(f"run.env names {place!r} as the {aws}, but {CUSTOM_FILES}/{place} is not there.")
+            drfc.files[aws] = there[0] if there else base
+            for key, became in drfc.used.items():
+                if became == f"{CUSTOM_FILES}/{place}":
+                    model.used[key] = f"{CUSTOM_FILES}/{drfc.files[aws]}"
         model.unused.update(drfc.without_effect)
         model.unknown.update(drfc.unknown)
         model.notes += drfc.notes

@@ -50,7 +50,7 @@ def role(name: str) -> Role:
     """What a file is for, by its path."""
     parts = name.split("/")
     base, parent = parts[-1], parts[-2] if len(parts) > 1 else ""
-    if base in PLACES or (parent == CUSTOM_FILES and base.endswith(".json")):
+    if base in PLACES or (CUSTOM_FILES in parts[:-1] and base.endswith(".json")):
         return "settings"
     if name == RUN or name.endswith((f"/{RUN}", "metrics/history.jsonl", "metrics/evolution.jsonl", "/notes.md")):
         return "own"
