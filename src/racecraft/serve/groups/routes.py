@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Request, Response
@@ -194,13 +196,15 @@ def copy_model(group_id: Id, body: CopyModel, consoles: InConsoles, person: InPe
     source = theirs.folder(body.model)
     name = body.name or ours.name_beside(body.model)
     ours.require_new(name)
-    incoming = consoles.of(person.id).settings.state / "incoming" / name
+    incoming = consoles.of(person.id).settings.incoming
     try:
-        shutil.rmtree(incoming, ignore_errors=True)
-        shutil.copytree(source.path, incoming, ignore=shutil.ignore_patterns(".lock", f"{LIVE}*"))
-        incoming.rename(ours.runs / name)
+        incoming.mkdir(parents=True, exist_ok=True)
+        # a folder of its own: who asks twice, or trains under that name, has another one arrive there meanwhile
+        with TemporaryDirectory(prefix=f"{name}.", dir=incoming, ignore_cleanup_errors=True) as folder:
+            copy = FilePath(folder) / name
+            shutil.copytree(source.path, copy, ignore=shutil.ignore_patterns(".lock", f"{LIVE}*"))
+            copy.rename(ours.runs / name)
     except (OSError, shutil.Error) as error:
-        shutil.rmtree(incoming, ignore_errors=True)
         raise RunError(f"Model {body.model!r} cannot be copied now.", hint="Wait until its job has ended.") from error
     return ours.card(name)
 
