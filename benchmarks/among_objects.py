@@ -4,10 +4,11 @@
     .venv/bin/python benchmarks/among_objects.py --routes ../shared/tracks --run starter:dodger   # one policy for all
 
 For each seed and each route as wide as those of races among objects: `racecraft train --race object-avoidance` (six
-boxes at random places) or, with `--race head-to-bot`, three bots that change lanes, at 1 m/s or with other `--actions`;
-then 60 laps by the best checkpoint, each with places of its own. Nobody puts the car back: a lap counts only when it is
-clean. The last line on stdout is JSON with a figure for each seed: the share of laps that are clean (no other is
-completed), the share of the worst route, and the median of the routes' lap times over their minimum without objects.
+boxes at random places) or, with `--race head-to-bot`, three bots that change lanes, at 1 m/s or with other `--actions`
+and `--sensors`; then 60 laps by the best checkpoint, each with places of its own. Nobody puts the car back: a lap
+counts only when it is clean. The last line on stdout is JSON with a figure for each seed: the share of laps that are
+clean (no other is completed), the share of the worst route, and the median of the routes' lap times over their minimum
+without objects.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ def main() -> None:
     parser.add_argument("--only", action="append", help="name of a route; repeatable")
     parser.add_argument("--race", choices=RACES, default="object-avoidance")
     parser.add_argument("--actions", help="the cars' action space; by default the race's own, 1 m/s")
+    parser.add_argument("--sensors", default="", help="what they see with, joined by +; by default the race's own")
     parser.add_argument("--until", default="10 minutes", help="limit of each training")
     parser.add_argument("--seeds", default="1", help="as 1,2,3")
     parser.add_argument("--laps", type=int, default=60, help="that judge")
@@ -65,8 +67,8 @@ def main() -> None:
                 print(json.dumps(rows[-1]), file=sys.stderr, flush=True)
     if options.output is not None:
         options.output.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    told = {"race": options.race, "actions": options.actions, "until": options.until, "routes": len(routes)}
-    print(json.dumps({**told, **_summary(rows)}))
+    told = {"race": options.race, "actions": options.actions, "sensors": options.sensors, "until": options.until}
+    print(json.dumps({**told, "routes": len(routes), **_summary(rows)}))
 
 
 def _is_judged(track: Track, only: list[str] | None) -> bool:
@@ -92,6 +94,7 @@ def _measure(route: Track, seed: int, options: argparse.Namespace, *, root: Path
             path,
             objects=objects,
             actions=options.actions,
+            sensors=tuple(filter(None, options.sensors.split("+"))),
             until=Until.parse(f"20 laps or {options.until}"),
             seed=seed,
             num_threads=options.num_threads,

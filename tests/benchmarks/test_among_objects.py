@@ -12,6 +12,7 @@ import pytest
 from racecraft.agent import action_space
 from racecraft.run import RunFolder
 
+SENSORS = "STEREO_CAMERAS+LIDAR"
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "among_objects.py"
 
 
@@ -25,16 +26,17 @@ def test_the_script_writes_a_row_for_every_seed_and_route(tmp_path: Path) -> Non
     table = tmp_path / "table.json"
     small = ("--only", "oval", "--laps", "3", "--until", "64 steps", "--no-minimum", "--race", "head-to-bot")
     kept = ("--runs", str(tmp_path / "runs"), "-o", str(table))
-    done = run("--routes", "library", *small, "--seeds", "1,2", "--actions", "fast", *kept)
+    done = run("--routes", "library", *small, "--seeds", "1,2", "--actions", "fast", "--sensors", SENSORS, *kept)
     assert done.returncode == 0, done.stderr
     last, rows = json.loads(done.stdout.splitlines()[-1]), json.loads(table.read_text())
     assert [(row["seed"], row["route"], row["of"]) for row in rows] == [(1, "oval", 3), (2, "oval", 3)]
     assert last["clean_share"] == last["lap_share"] == last["worst_route"] == [row["clean"] / 3 for row in rows]
     assert last["over_minimum"] == [None, None]
-    assert last["actions"] == "fast"
+    assert (last["actions"], last["sensors"]) == ("fast", SENSORS)
     for seed in (1, 2):
         kept_run = RunFolder(tmp_path / "runs" / f"head-to-bot-oval-{seed}")
-        assert kept_run.read_model_metadata().action_space == action_space("fast")
+        metadata = kept_run.read_model_metadata()
+        assert (metadata.action_space, "+".join(metadata.sensors)) == (action_space("fast"), SENSORS)
 
 
 @pytest.mark.costly
