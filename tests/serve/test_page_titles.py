@@ -47,7 +47,7 @@ def test_pages_of_a_league_have_titles_of_their_own(tmp_path: Path) -> None:
                 ):
                     page.goto(address + path)
                     expect(page).to_have_title(re.compile(rf"^{title} · Racecraft$"), timeout=30_000)
-                page.evaluate("history.back()")
+                page.go_back(wait_until="commit")
                 expect(page).to_have_title(re.compile(r".+: Class 9b · Racecraft$"), timeout=30_000)
         finally:
             browser.close()
