@@ -82,6 +82,13 @@ def test_a_field_of_another_kind_is_refused(name: str, value: Any) -> None:
         TrainSettings.from_dict({**SETTINGS.to_dict(), name: value})
 
 
+def test_opponents_of_whom_nothing_is_said_are_the_usual_ones() -> None:
+    usual = TrainSettings.from_dict({**TrainSettings().to_dict(), "opponents": {}})
+    assert usual.opponents == Opponents()
+    with pytest.raises(RunError, match="settings in run.json"):
+        TrainSettings.from_dict({**TrainSettings().to_dict(), "opponents": {"drivers": None}})
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
     [

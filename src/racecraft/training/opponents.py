@@ -57,4 +57,4 @@ class Opponents:
     @classmethod
     def from_dict(cls, document: Mapping[str, Any] | None) -> Opponents | None:
         """From what `dataclasses.asdict` gave; TypeError where a field is unknown."""
-        return None if document is None else cls(**{**document, "drivers": tuple(document["drivers"])})
+        return None if document is None else cls(**{**document, "drivers": tuple(document.get("drivers", (SELF,)))})
