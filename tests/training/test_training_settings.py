@@ -85,7 +85,7 @@ def test_a_field_of_another_kind_is_refused(name: str, value: Any) -> None:
 def test_opponents_of_whom_nothing_is_said_are_the_usual_ones() -> None:
     usual = TrainSettings.from_dict({**TrainSettings().to_dict(), "opponents": {}})
     assert usual.opponents == Opponents()
-    with pytest.raises(RunError, match="settings in run.json"):
+    with pytest.raises(RunError, match="do not fit this version"):
         TrainSettings.from_dict({**TrainSettings().to_dict(), "opponents": {"drivers": None}})
 
 
