@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from leagues import running_league
+from leagues import running_league, untrained_run
 from postgres_servers import PostgresServer, binaries, postgres_server
 from running_consoles import RunningConsole, running_console
 from running_workers import processes_on
 from s3_servers import S3Server, s3_server
 from schools import School
+
+from racecraft.race.entry_file import pack_entry
 
 if TYPE_CHECKING:
     from racecraft.serve.store.database import Database
@@ -66,6 +68,12 @@ def database(tmp_path: Path) -> Iterator[Database]:
     database.migrate()
     yield database
     database.close()
+
+
+@pytest.fixture(scope="session")
+def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A file to enter a race with, of a network that was never trained."""
+    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
 
 
 @pytest.fixture

@@ -16,10 +16,8 @@ from typing import Any
 
 import pytest
 from courts import Court, announced
-from leagues import untrained_run
 
 from racecraft.errors import RunError
-from racecraft.race.entry_file import pack_entry
 from racecraft.race.rules import race_rules
 from racecraft.replay.replay import read_replay
 from racecraft.serve.settings import STATE_FOLDER
@@ -37,11 +35,6 @@ from racecraft.serve.submissions.bench import Bench
 with Bench().asked(json.loads(sys.argv[1]), folder=Path(sys.argv[2])):
     pass
 """
-
-
-@pytest.fixture(scope="module")
-def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
 
 
 def asked(seconds: float, trials: int) -> Told:

@@ -33,11 +33,6 @@ locked = pytest.mark.skipif(not HERE.is_complete, reason=f"no {HERE.missing} her
 Told = dict[str, Any]
 
 
-@pytest.fixture(scope="module")
-def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
-
-
 @pytest.fixture
 def told(tmp_path: Path, entry: bytes) -> Told:
     """What a judge is asked, of an entry in a folder of its own."""

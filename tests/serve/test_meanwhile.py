@@ -9,9 +9,7 @@ from types import ModuleType
 
 import pytest
 import sqlalchemy as sa
-from leagues import untrained_run
 
-from racecraft.race.entry_file import pack_entry
 from racecraft.serve.groups.groups import Groups
 from racecraft.serve.people import people as people_module
 from racecraft.serve.people.people import People, add_person
@@ -29,11 +27,6 @@ from racecraft.serve.tracks.courses import Courses
 TEACHER, ADA = 2, 3
 CUP, FINAL = 1, 2
 SOON = 1.0  # s that somebody else is given; who has to wait comes afterwards
-
-
-@pytest.fixture(scope="module")
-def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
 
 
 @pytest.fixture

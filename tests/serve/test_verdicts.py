@@ -33,11 +33,6 @@ from racecraft.serve.submissions.judge import JUDGED
 from racecraft.track import load_track
 
 
-@pytest.fixture(scope="module")
-def entry(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return pack_entry(untrained_run(tmp_path_factory.mktemp("runs"), "novice"))
-
-
 @pytest.fixture
 def court(tmp_path: Path) -> Iterator[Court]:
     court = Court(tmp_path)
