@@ -390,6 +390,16 @@ def test_another_track_is_refused(lines, tmp_path):
         replay(write(tmp_path / "b.csv", moved), track="oval")
 
 
+def test_logs_of_one_name_are_told_apart(lines, tmp_path):
+    for folder, length in (("0", None), ("1", "60.0")):  # workers write files of the same names
+        (tmp_path / folder).mkdir()
+        told = [[*fields[:13], length or fields[13], *fields[14:]] for fields in lines]
+        write(tmp_path / folder / "0-iteration.csv", told)
+    paths = [tmp_path / folder / "0-iteration.csv" for folder in ("0", "1")]
+    with pytest.raises(RunError, match=r"[/\\]1[/\\]0-iteration\.csv was driven on a track of 60\.00 m"):
+        replay(paths, track="oval")
+
+
 def test_too_little_to_calibrate(lines, tmp_path):
     with pytest.raises(RunError, match="windows of 21 rows"):
         calibrate(write(tmp_path / "a.csv", lines[:40]))

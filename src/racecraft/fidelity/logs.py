@@ -14,6 +14,7 @@ import gzip
 import io
 import re
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -113,21 +114,23 @@ class Faults:
 
 
 def read_logs(paths: Iterable[str | Path], faults: Faults) -> Iterator[Log]:
-    """Whole episodes of every file, in order.
+    """Whole episodes of every file, in order. A file's source is its name; its path where others have the same name.
 
     Raises:
         RunError: A file is missing, holds no sim-trace, or most of its rows are broken.
     """
-    for path in paths:
-        yield from _read_file(Path(path), faults)
+    files = list(map(Path, paths))
+    named = Counter(path.name for path in dict.fromkeys(files))
+    for path in files:
+        yield from _read_file(path, path.name if named[path.name] == 1 else str(path), faults)
 
 
-def _read_file(path: Path, faults: Faults) -> Iterator[Log]:
+def _read_file(path: Path, source: str, faults: Faults) -> Iterator[Log]:
     rows: list[tuple[int, Sequence[str]]] = []
     good, broken_before = 0, faults.count
     try:
         with open_regular(path) as raw, _decoded(raw) as file:
-            for log in _batches(path.name, file, rows, faults):
+            for log in _batches(source, file, rows, faults):
                 good += len(log)
                 yield log
     except (OSError, EOFError, zlib.error) as error:
