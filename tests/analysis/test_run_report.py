@@ -19,6 +19,7 @@ from racecraft.judging.evaluation import evaluate_run
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.track import load_track
+from racecraft.track.readers import save_route
 from racecraft.training import Until
 from racecraft.training.job import Training
 from racecraft.training.settings import make_settings
@@ -73,6 +74,45 @@ def test_nothing_is_drawn_on_a_road_that_was_redrawn_since(run: Path, tmp_path: 
     information = json.loads((again / "run.json").read_text())
     (again / "run.json").write_text(json.dumps({**information, **redrawn}))
     assert "<h2>Where it was paid</h2>" not in write_report(again).read_text()
+
+
+def test_a_run_whose_track_is_gone_has_a_report_too(run: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(run, again)
+    information = json.loads((again / "run.json").read_text())
+    several = {"track": f"oval + {tmp_path}/my road.npy"}
+    (again / "run.json").write_text(json.dumps({**information, **several}))
+    (summary,) = again.glob("evaluation-*/evaluation.json")
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), "track": "my road"}))
+    text = write_report(again).read_text()
+    assert "oval + my road · " in text  # all of them, and no folder
+    assert str(tmp_path) not in text
+    assert "The track is not there any more, so neither the line nor the corners are drawn." in text
+    for heading in ("Learning", "Laps of the last evaluation", "Actions", "Settings"):
+        assert f"<h2>{heading}</h2>" in text
+
+
+def test_an_evaluation_on_any_of_several_tracks_has_its_line(run: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(run, again)
+    save_route(load_track("oval"), tmp_path / "my road.npy")
+    information = json.loads((again / "run.json").read_text())
+    (again / "run.json").write_text(json.dumps({**information, "track": f"bowtie + {tmp_path}/my road.npy"}))
+    (summary,) = again.glob("evaluation-*/evaluation.json")
+    told = {"track": "my road", "track_digest": load_track(tmp_path / "my road.npy").digest}
+    summary.write_text(json.dumps({**json.loads(summary.read_text()), **told}))
+    assert "Racing line, coloured by speed" in write_report(again).read_text()
+
+
+@pytest.mark.parametrize("rows", [0, 3])
+def test_an_evaluation_without_a_lap_leaves_a_report(run: Path, tmp_path: Path, rows: int) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(run, again)
+    (trace,) = again.glob("evaluation-*/evaluation-simtrace/0-iteration.csv")
+    trace.write_text("".join(trace.read_text().splitlines(keepends=True)[: 1 + rows]))
+    text = write_report(again).read_text()
+    assert "<h2>Learning</h2>" in text
+    assert "<h2>Laps of the last evaluation</h2>" not in text
 
 
 @pytest.mark.costly

@@ -22,10 +22,10 @@ from racecraft.analysis.maps import LARGEST, draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
 from racecraft.checks import is_number
-from racecraft.errors import RacecraftError, RunError
+from racecraft.errors import RacecraftError, RunError, TrackError, TrackNotFound
 from racecraft.json_file import read_json_object
-from racecraft.judging.trained import is_road_of
-from racecraft.run import RunFolder, Stretch, read_stretches
+from racecraft.judging.trained import is_road_of, trained_title
+from racecraft.run import RunFolder, RunInfo, Stretch, read_stretches
 from racecraft.run.atomic import write_file
 from racecraft.run.history import read_history
 from racecraft.track import Track, joint_digest, load_track, load_tracks
@@ -60,29 +60,28 @@ def report(folder: RunFolder) -> str:
     """A run's report as one HTML text.
 
     Raises:
-        RacecraftError: The run, or its track, cannot be read.
+        RacecraftError: The run cannot be read.
     """
     info = folder.read_info()
-    roads = load_tracks(info.track)
-    track = roads[0]
+    roads = _roads(info)
     points = _history(folder)
     evaluation = _latest_evaluation(folder)
     stretches = read_stretches(folder)
     sections = [_learning(points, stretches), stretch_table(folder, stretches)]
     figures = _training_figures(folder, points)
-    lead = f"{escape(_title(info.track))} · {escape(info.created.replace('T', ' ')[:16])} UTC"
+    lead = f"{escape(trained_title(info))} · {escape(info.created.replace('T', ' ')[:16])} UTC"
     hero = ""
     if evaluation is not None:
         stamp, summary = evaluation
         figures = _race_figures(summary) + figures
         with suppress(RacecraftError, KeyError):
-            hero, more = _race(folder, stamp, summary, track)
+            hero, more = _race(folder, stamp, summary, roads)
             sections = [*more, *sections]
-    is_as_it_was = joint_digest(roads) == info.track_digest
+    is_as_it_was = bool(roads) and joint_digest(roads) == info.track_digest
     sections += [
-        _maps(folder, track) if is_as_it_was else "",
+        _maps(folder, roads[0]) if is_as_it_was else "",
         checkpoint_table(folder, stretches),
-        _actions(folder, track),
+        _actions(folder, roads),
     ]
     sections += rewards(stretches, folder.read_reward_function())
     sections.append(_settings(folder))
@@ -92,13 +91,15 @@ def report(folder: RunFolder) -> str:
 # ---- the parts
 
 
-def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Track) -> tuple[str, list[str]]:
+def _race(folder: RunFolder, stamp: str, summary: dict[str, Any], trained_on: Sequence[Track]) -> tuple[str, list[str]]:
     """Racing line, telemetry, corners and laps of an evaluation."""
-    name = str(summary.get("track", ""))
-    track = trained_on if name in ("", trained_on.name) else load_track(name)
     laps = read_laps(folder.evaluation(stamp) / "evaluation-simtrace" / "0-iteration.csv")
-    if not is_road_of(summary, folder.read_info(), track):
-        words = "The track was changed since, so neither the line nor the corners are drawn."
+    if not laps:
+        return "", []
+    track = _road(str(summary.get("track", "")), trained_on)
+    if track is None or not is_road_of(summary, folder.read_info(), track):
+        how = "is not there any more" if track is None else "was changed since"
+        words = f"The track {how}, so neither the line nor the corners are drawn."
         return "", [section("Laps of the last evaluation", f"<p>{words}</p>{_laps(laps)}")]
     driven = driven_direction(track, [lap.points for lap in laps])
     whole = sorted((lap for lap in laps if lap.is_complete), key=lambda lap: lap.seconds)
@@ -240,7 +241,7 @@ def _maps(folder: RunFolder, track: Track) -> str:
     return section("Where it was paid", f"<p>{words}</p>{picture}") if picture else ""
 
 
-def _actions(folder: RunFolder, track: Track) -> str:
+def _actions(folder: RunFolder, roads: Sequence[Track]) -> str:
     metadata = folder.read_model_metadata()
     space = metadata.action_space
     if space.kind != "discrete":
@@ -248,7 +249,8 @@ def _actions(folder: RunFolder, track: Track) -> str:
         rows = [[name.replace("_", " "), str(limit["low"]), str(limit["high"])] for name, limit in limits.items()]
         return section("Actions", table(["Continuous", "Low", "High"], rows))
     iterations = iterations_of(folder.training_simtrace)[-LAST_ITERATIONS:]
-    usage = draw_maps(track, folder.training_simtrace, iterations).usage if iterations else np.zeros(0)
+    is_known = bool(iterations and roads)
+    usage = draw_maps(roads[0], folder.training_simtrace, iterations).usage if is_known else np.zeros(0)
     actions = space.to_degrees()  # type: ignore[union-attr]
     rows = [
         [str(index), f"{angle:g}", f"{speed:.2f}", f"{100 * usage[index]:.0f} %" if index < len(usage) else "–"]
@@ -260,7 +262,7 @@ def _actions(folder: RunFolder, track: Track) -> str:
 
 def _settings(folder: RunFolder) -> str:
     info = folder.read_info()
-    document = {"seed": info.seed, "track": _title(info.track), **info.settings}
+    document = {"seed": info.seed, "track": trained_title(info), **info.settings}
     rows = _flat(document)
     metadata = _flat({"model_metadata": folder.read_model_metadata().to_dict()})
     rows += [(name, text) for name, text in metadata if ".action_space" not in name or name.endswith("_type")]
@@ -292,6 +294,23 @@ def _training_figures(folder: RunFolder, points: list[dict[str, Any]]) -> list[t
 
 
 # ---- reading
+
+
+def _roads(info: RunInfo) -> Sequence[Track]:
+    """The tracks of the training; none where their files are gone, or lie elsewhere on this machine."""
+    with suppress(TrackNotFound, TrackError):
+        return load_tracks(info.track)
+    return ()
+
+
+def _road(name: str, trained_on: Sequence[Track]) -> Track | None:
+    """The track of an evaluation: of the training's where one is called so; None where there is none."""
+    for road in trained_on:
+        if name in ("", road.name):
+            return road
+    with suppress(TrackNotFound, TrackError):
+        return load_track(name)
+    return None
 
 
 def _history(folder: RunFolder) -> list[dict[str, Any]]:
@@ -330,11 +349,6 @@ def _mean(values: Any) -> float:
 
 def _seconds(value: Any) -> str:
     return f"{value:.3f} s" if isinstance(value, int | float) else "–"
-
-
-def _title(track: str) -> str:
-    """A track's name without the folders of somebody's disk."""
-    return ", ".join(Path(part).stem if "/" in part or "\\" in part else part for part in track.split(","))
 
 
 def _flat(value: Any, name: str = "") -> list[tuple[str, str]]:
