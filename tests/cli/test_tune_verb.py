@@ -46,6 +46,24 @@ def test_no_number_of_the_table_is_folded(tmp_path: Path, capsys: pytest.Capture
     assert row.split()[-5:] == ["-0.00058", "0.1714", "0.000203", "0.9997", "1.23e+05"]
 
 
+def test_every_number_is_in_the_table_on_a_narrow_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    params = {f"CONSTANT_NUMBER_{place}": 0.125 + place for place in range(11)}  # as many as are searched of themselves
+    space = tuple(
+        Parameter(name=name, kind="constant", low=0.0, high=1.0, is_log=False, is_whole=False, default=value)
+        for name, value in params.items()
+    )
+    trial = TrialOutcome(
+        number=0, state="complete", value=64.0, params=params, run="r", completion=1.0,
+        best_lap_seconds=None, steps=64, seconds=1.0, error="",
+    )  # fmt: skip
+    say_tuned(Outcome(folder=tmp_path, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
+    row = next(line for line in capsys.readouterr().out.splitlines() if "64 steps" in line)
+    assert row.split()[-11:] == [f"{value:.4g}" for value in params.values()]
+
+
 @pytest.mark.parametrize("limit", [("--minutes", "nan"), ("--trials", "-1"), ("--processes", "5000")])
 def test_a_limit_that_is_not_allowed_leaves_no_search(racecraft: Run, limit: tuple[str, str]) -> None:
     pytest.importorskip("optuna")

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.cli.tables import show_table
+
 if TYPE_CHECKING:
     from racecraft.course import Lesson
     from racecraft.course.progress import Progress
@@ -68,7 +70,7 @@ def say_lessons(lessons: Sequence[Lesson], progress: Progress, language: str) ->
             Text(f"{solved} {words['of']} {len(names)}", "green" if solved == len(names) else ""),
             Text("–" if share is None else f"{100 * share:.0f} %", "green" if share == 1.0 else ""),
         )
-    console.print(table)
+    show_table(console, table)
     open_it, run_it = (f"racecraft lessons {verb} 1{words['option']}" for verb in ("open", "run"))
     line = Text.assemble(words["begin"], (open_it, "bold"), words["otherwise"], (run_it, "bold"))
     console.print(line, soft_wrap=True)

@@ -11,6 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+from racecraft.cli.tables import show_table
 from racecraft.errors import printable
 
 MOST_ROWS: Final = 40
@@ -32,7 +33,7 @@ def say_perceived(told: Sequence[dict[str, Any]], output: Path | None) -> None:
             middle,
             "–" if one["distance_m"] is None else f"{one['distance_m']:.1f} m",
         )
-    console.print(table)
+    show_table(console, table)
     if len(told) > MOST_ROWS:
         console.print(f"{len(told) - MOST_ROWS:,} more; --json has them all.")
     if output is not None:

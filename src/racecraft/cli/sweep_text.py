@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.cli.tables import show_table
 from racecraft.errors import typed
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def say_board(name: str, board: Board, *, runs: Path) -> None:
     table.add_column("seeds", justify="right")
     table.add_column("laps after, steps", justify="right", no_wrap=True)
     table.add_column("best lap, s", justify="right", no_wrap=True)
-    table.add_column("")
+    table.add_column("", min_width=len("tied"))
     for row in board.places:
         if not row.seeds:
             table.add_row("", row.setting, "0", NOTHING, NOTHING, "not begun", style="dim")
@@ -54,7 +55,7 @@ def say_board(name: str, board: Board, *, runs: Path) -> None:
             _shown(row.best_lap, ".3f", row.seeds),
             Text("tied", style="yellow") if row.is_tied else "",
         )
-    console.print(table)
+    show_table(console, table)
     ranges = "Means over seeds, with the range that holds the true mean with 95 %."
     tied = " Tied may be as good as the first: train more seeds." if any(row.is_tied for row in board.places) else ""
     console.print(Text(ranges + tied, style="dim"), soft_wrap=True)

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.cli.tables import show_table
 from racecraft.errors import printable, printable_lines, typed
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def say_evaluated(outcome: RunEvaluation) -> None:
             f"{sum(lap.penalty_seconds for lap in trial.laps):.1f} s",
             f"{100 * trial.completion:.0f} %",
         )
-    console.print(table)
+    show_table(console, table)
     _say(console, outcome.summary)
     driven = outcome.provenance
     _say(console, (f"{driven.sentence[:1].upper()}{driven.sentence[1:]}.", "bold yellow" if driven.own else "dim"))
@@ -171,7 +172,7 @@ def say_raced(outcome: RunRace) -> None:
             *([str(standing.crash_count)] if is_crowded else []),
             str(standing.resets),
         )
-    console.print(table)
+    show_table(console, table)
     if terms.ranking != "total" or terms.minimum_laps < conditions.rules.laps:
         what = {"total": "total time", "best": "best lap", "average": "best average"}[terms.ranking]
         _say(console, f"Ranked by {what}; {terms.minimum_laps} laps of a trial needed.")
@@ -202,7 +203,7 @@ def say_rated(found: Ladder) -> None:
             str(row.draws),
             str(row.losses),
         )
-    console.print(table)
+    show_table(console, table)
     _say(console, (f"Schedule {found.schedule}, seed {found.seed}: the same command gives the same table.", "dim"))
 
 
@@ -248,7 +249,7 @@ def say_laps(found: Generalization, *, title: str) -> None:
             cells.append(Text(f"{100 * result.completion:.0f} %", "" if is_done else "yellow"))
             cells.append(f"{min(result.lap_times):.1f} s" if result.lap_times else "–")
         table.add_row(name, f"{results[0].length:.1f} m", *cells)
-    console.print(table)
+    show_table(console, table)
     low, high = found.lap_interval
     _say(
         console,
@@ -271,7 +272,7 @@ def say_tracks(listed: list[tuple[Track, Any]], limits: list[TrackLimit | None])
         limit = f"{known.ideal:.2f} s" if known else "–"
         facts = (f"{track.length:.1f} m", f"{track.mean_width:.2f} m", radius, limit)
         table.add_row(track.name, *facts, design.description)
-    console.print(table)
+    show_table(console, table)
     _say(console, "Draw one with ", ("racecraft tracks show NAME", "bold"), "; files and 'generated:7' work too.")
 
 
@@ -282,7 +283,7 @@ def say_rewards(listed: dict[str, str]) -> None:
     table.add_column("", overflow="fold")
     for name, text in listed.items():
         table.add_row(name, text)
-    console.print(table)
+    show_table(console, table)
     _say(console, "Start your own from one: ", ("racecraft reward show racing > reward_function.py", "bold"))
 
 
@@ -299,7 +300,7 @@ def say_checked(problems: list[Problem], outcomes: list[Outcome], *, failed: boo
         for outcome in outcomes:
             reward = Text("error", "bold red") if outcome.reward is None else Text(f"{outcome.reward:.4g}")
             table.add_row(outcome.situation.description, reward)
-        console.print(table)
+        show_table(console, table)
     for outcome in outcomes:
         if lines := outcome.printed.splitlines():
             _say(console, (f"Printed at {outcome.situation.name!r}:", "bold"))
@@ -325,7 +326,7 @@ def say_examined(findings: list[Finding]) -> None:
         good = Text("warn", "bold yellow") if finding.warns else Text("ok", "green")
         mark = good if finding.ok else Text("bad", "bold red")
         table.add_row(mark, Text(finding.name, "bold"), text)
-    console.print(table)
+    show_table(console, table)
 
 
 def say_replayed(result: Comparison, picture: Path | None) -> None:
@@ -344,7 +345,7 @@ def say_replayed(result: Comparison, picture: Path | None) -> None:
     ):
         if found[key] is not None:
             table.add_row(name, f"{100 * found[key]:.3f} %")
-    console.print(table)
+    show_table(console, table)
     if result.examples:
         _say_errors(console, {"median": _medians(found), "90 %": _medians(found, "_p90")})
     for note in (*result.differences.shown(10), *result.faults.notes[:5]):
@@ -374,7 +375,7 @@ def say_frame(fit: FrameFit, picture: Path | None) -> None:
     for name in ("horizon", "lines", "dashes"):
         if offsets[name] is not None:
             table.add_row(f"{name}, 95 % within", f"{offsets[name]:.2f} px")
-    console.print(table)
+    show_table(console, table)
     if found["structural_similarity"] < SAME_PLACE:
         _say(console, ("That is not alike: is it this track, and its front camera?", "bold yellow"))
     if picture is not None:
@@ -420,7 +421,7 @@ def _say_errors(console: Console, rows: dict[str, dict[str, dict[str, float]]]) 
     for name, errors in rows.items():
         pairs = zip(errors["position_error_m"].values(), errors["heading_error_deg"].values(), strict=True)
         table.add_row(name, *(f"{100 * metres:.1f} cm, {degrees:.1f}°" for metres, degrees in pairs))
-    console.print(table)
+    show_table(console, table)
 
 
 def say_measured(results: dict[str, Any]) -> None:

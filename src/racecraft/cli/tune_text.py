@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from racecraft.cli.tables import show_table
 from racecraft.errors import typed
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def say_tuned(outcome: Outcome) -> None:
     best, baseline = outcome.best, outcome.baseline
     ranked = sorted((t for t in outcome.trials if t.value is not None and t.state == "complete"), key=_value)
     if ranked:
-        console.print(_trials(outcome, ranked))
+        show_table(console, _trials(outcome, ranked))
     counts = ", ".join(
         f"{sum(trial.state == state for trial in outcome.trials)} {state}"
         for state in ("complete", "pruned", "out of time", "fail")
@@ -40,7 +41,7 @@ def say_tuned(outcome: Outcome) -> None:
     )
     console.print(Text(f"{len(outcome.trials)} trials: {counts}.", style="dim"), soft_wrap=True)
     if outcome.importances:
-        console.print(_importances(outcome))
+        show_table(console, _importances(outcome))
     else:
         console.print(Text("Too few trials ended to say what mattered.", style="dim"), soft_wrap=True)
     if best is not None:
