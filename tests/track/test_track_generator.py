@@ -111,3 +111,44 @@ def test_a_radius_makes_bends_as_tight_as_official_ones():
 def test_radii_that_are_refused(radius):
     with pytest.raises(TrackError, match=r"radius is .*; allowed are 0.35 to 5"):
         generate_track(1, radius=radius)
+
+
+def least_ground_and_sharpest_turn(track: Track) -> tuple[float, float]:
+    """Between two stretches of road, metres, and within 2.6 m of it, radians."""
+    s = np.arange(0.0, track.length, 0.05)
+    points = track.point_at(s)
+    distance = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    apart = np.abs(s[:, None] - s[None])
+    is_elsewhere = np.minimum(apart, track.length - apart) > math.pi / 2 * (track.mean_width + 1.0)
+    heading = np.concatenate([[0.0], np.cumsum(track.curvature_at(s)) * 0.05])
+    turned = np.abs(heading[52:] - heading[:-52])
+    return float(distance[is_elsewhere].min()) - track.mean_width, float(turned.max())
+
+
+def test_a_verge_folds_the_road_and_is_kept():
+    options = {"width": 1.07, "radius": 0.45, "difficulty": 1}
+    folded = [generate_track(seed, verge=0.3, **options) for seed in range(16)]
+    ground, turns = zip(*map(least_ground_and_sharpest_turn, folded), strict=True)
+    others, their_turns = zip(
+        *(least_ground_and_sharpest_turn(generate_track(seed, **options)) for seed in range(16)), strict=True
+    )
+    assert min(ground) > 0.3
+    assert np.median(ground) < 0.65 < np.median(others)
+    assert np.median(turns) > math.radians(160) > np.median(their_turns)
+    for track in folded:
+        validate(track)
+        assert load_track(track.name).digest == track.digest
+    assert folded[0].name == "generated:0,width=1.07,difficulty=1,radius=0.45,verge=0.3"
+
+
+def test_any_verge_is_kept():
+    for seed in range(12):
+        track = generate_track(seed, verge=1.0, width=0.5 + seed % 4 / 2, difficulty=seed / 11)
+        validate(track)
+        assert least_ground_and_sharpest_turn(track)[0] > 0.98
+
+
+@pytest.mark.parametrize("verge", [0.05, 1.5, math.nan, 0.0])
+def test_verges_that_are_refused(verge):
+    with pytest.raises(TrackError, match=r"verge is .*; allowed are 0.1 to 1"):
+        generate_track(1, verge=verge)

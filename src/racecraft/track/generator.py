@@ -1,9 +1,10 @@
 """Draws a new closed track from a seed: always drivable, never twice the same, the same on every machine.
 
-Two kinds of layout, as the seed has it, both rounded by `curve.trace_corners`:
+Two kinds of layout, as the seed has it, and one on demand, all rounded by `curve.trace_corners`:
 
     street    the outline of random squares that hang together, shaken: parallel roads, right angles, hairpins
     country   points around a middle, some pulled in: sweepers, long bends, open radii
+    folded    a street whose squares branch like a tree: hairpins to either side, one behind the other
 
 A draft that comes too close to itself or bends too tightly is thrown away; after many of them, an oval.
 """
@@ -26,6 +27,7 @@ SHORTEST_LAP = 14.0  # times the width; shorter, no bend is both inside the lap 
 TIGHTEST_RADIUS = 0.7  # metres; a DeepRacer turns on about 0.3 m at full lock, slowly
 VERGE = 0.3  # metres of ground between two stretches of road, at least
 NARROW_VERGE = 0.1  # metres; the same where a radius is asked for, as some official tracks have it
+MIN_VERGE, MAX_VERGE = 0.1, 1.0  # metres, where a road is to fold; an oval has more
 MIN_RADIUS, MAX_RADIUS = 0.35, 5.0  # metres
 _DRAFTS = 300
 
@@ -37,6 +39,7 @@ def generate_track(
     width: float | None = None,
     difficulty: float = 0.5,
     radius: float | None = None,
+    verge: float | None = None,
 ) -> Track:
     """A new closed track, the same for the same arguments everywhere.
 
@@ -48,6 +51,8 @@ def generate_track(
         difficulty: 0 (few, wide bends) to 1 (many, tight ones).
         radius: Tightest bend of the centre line, metres, 0.35 to 5, but at least 0.52 times the width; roads may
             then come as close as 0.1 m. Default: 0.7, and more for a wide road; official tracks go down to 0.4.
+        verge: Least ground between two stretches of road, metres, 0.1 to 1; with it the road folds into hairpins to
+            either side, the closer the higher the difficulty. Default: it need not fold, and leaves 0.3.
 
     Returns:
         A track whose name, given to `load_track`, brings it back.
@@ -58,12 +63,13 @@ def generate_track(
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**63:
         raise TrackError(f"seed is {seed!r}; allowed are integers from 0.")
     options = {"length": length, "width": width, "difficulty": difficulty if difficulty != 0.5 else None}
-    options["radius"] = radius
+    options |= {"radius": radius, "verge": verge}
     ranges = {
         "length": (MIN_LENGTH, MAX_LENGTH),
         "width": (MIN_WIDTH, MAX_WIDTH),
         "difficulty": (0.0, 1.0),
         "radius": (MIN_RADIUS, MAX_RADIUS),
+        "verge": (MIN_VERGE, MAX_VERGE),
     }
     for key, value in options.items():
         lowest, highest = ranges[key]
@@ -80,9 +86,9 @@ def generate_track(
     given = "".join(f",{key}={_plain(value)}" for key, value in options.items() if value is not None)
     name = f"generated:{int(seed)}{given}"
     is_clockwise = rng.random() < 0.5
-    is_street = rng.random() < 0.5
+    is_street = rng.random() < 0.5 or verge is not None
     roundness = (0.05 if is_street else 0.13) * lap  # metres of radius that chance may add to the tightest
-    room = _Room(road_width, radius)
+    room = _Room(road_width, radius, verge)
     for draft in range(_DRAFTS):
         # a draft that fails too often was too ambitious: become simpler
         ambition = difficulty * (1.0 - draft / _DRAFTS)
@@ -112,8 +118,8 @@ def parse_generated(name: str) -> Track:
             values[key] = float(value)
         except ValueError:
             values[key] = math.nan
-        if key not in {"length", "width", "difficulty", "radius"} or math.isnan(values[key]):
-            allowed = "length=, width=, difficulty= and radius="
+        if key not in {"length", "width", "difficulty", "radius", "verge"} or math.isnan(values[key]):
+            allowed = "length=, width=, difficulty=, radius= and verge="
             raise TrackError(f"{option!r} in {name[:80]!r} is no option; allowed are {allowed}.")
     if not (seed.isascii() and seed.isdigit() and len(seed) < 20):
         raise TrackError(f"{name[:80]!r} has no seed; write an integer after the colon, as in 'generated:7'.")
@@ -123,14 +129,22 @@ def parse_generated(name: str) -> Track:
 class _Room:
     """What a road of some width needs around it, metres."""
 
-    def __init__(self, width: float, radius: float | None) -> None:
+    def __init__(self, width: float, radius: float | None, verge: float | None) -> None:
         self.width = width
-        self.verge = VERGE if radius is None else NARROW_VERGE
+        self.is_folded = verge is not None
+        self.verge = verge if verge is not None else VERGE if radius is None else NARROW_VERGE
         self.sharpest = max(TIGHTEST_RADIUS, width / 2 + VERGE / 2) if radius is None else max(radius, 0.52 * width)
         # smallest radius to draw: room for a verge inside a hairpin
         self.tightest = 1.02 * (
             max(TIGHTEST_RADIUS, 0.54 * (width + VERGE)) if radius is None else max(radius, 0.52 * width)
         )
+
+    @property
+    def side(self) -> float:
+        """Of a street's squares: neighbouring roads are one apart, before they are shaken."""
+        if self.is_folded:
+            return max(self.width + self.verge, 2 * self.tightest) * 1.04
+        return max(self.width + self.verge + 0.4, 2 * self.tightest + 0.2) * 1.12
 
 
 # --- layouts: corner points of a counter-clockwise polygon, of any scale
@@ -138,9 +152,8 @@ class _Room:
 
 def _street(rng: random.Random, lap: float, room: _Room, difficulty: float) -> Floats | None:
     """The outline of random squares grown from one, without a hole, its corners shaken."""
-    # neighbouring roads are one square apart, and each square beyond the first adds two sides to the lap
-    side = max(room.width + room.verge + 0.4, 2 * room.tightest + 0.2) * 1.12
-    most = int((lap / side * 1.12 - 2) / 2)
+    # each square beyond the first adds two sides to the lap
+    most = int((lap / room.side * 1.12 - 2) / 2)
     if most < 2:
         return None
     num_squares = max(2, min(most, round(2 + 9 * difficulty + 2 * rng.random()), 26))
@@ -151,6 +164,8 @@ def _street(rng: random.Random, lap: float, room: _Room, difficulty: float) -> F
         x, y = sorted(squares)[_pick(rng, len(squares))]
         dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[_pick(rng, 4)]
         square = (x + dx, y + dy)
+        if room.is_folded and _num_beside(squares, square) > 1:
+            continue
         if square not in squares and _keeps_one_outline(squares, square):
             squares.add(square)
     points = _outline(squares)
@@ -266,6 +281,12 @@ def _keeps_one_outline(squares: set[tuple[int, int]], square: tuple[int, int]) -
     ring = ((1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1))
     taken = [(x + dx, y + dy) in squares for dx, dy in ring]
     return sum(taken[index] != taken[index - 1] for index in range(8)) == 2
+
+
+def _num_beside(squares: set[tuple[int, int]], square: tuple[int, int]) -> int:
+    """How many of its four sides a square shares."""
+    x, y = square
+    return sum(beside in squares for beside in ((x + 1, y), (x, y + 1), (x - 1, y), (x, y - 1)))
 
 
 def _outline(squares: set[tuple[int, int]]) -> Floats:
