@@ -19,6 +19,13 @@ from racecraft.course.show import NOT_KEPT
 from racecraft.course.shown import read_shown
 from racecraft.course.verdict import MARKS, right, wrong
 
+BORROWED = {  # what other rooms say, and a check passes on
+    "The reward callable returned None; every path through the function must return a number.",
+    "The reward callable returned the text {}; a reward is a number.",
+    "The reward callable returned {}; a reward is a finite number within ±100000.",
+    "It was called with params = {}",
+    "Did you mean {}?",
+}
 GERMAN = json.loads((lessons_folder() / "de/verdicts.json").read_text(encoding="utf-8"))
 LABELS = json.loads((lessons_folder() / "de/labels.json").read_text(encoding="utf-8"))
 
@@ -51,7 +58,7 @@ def sentences(path: Path) -> Iterator[str]:
 
 def test_every_sentence_of_a_check_is_there_in_german_and_no_other() -> None:
     modules = Path(exercises.__file__).parent.glob("*.py")
-    said = {text for path in modules for text in sentences(path)} | set(MARKS.values()) | {NOT_KEPT}
+    said = {text for path in modules for text in sentences(path)} | set(MARKS.values()) | {NOT_KEPT} | BORROWED
     assert len(said) > 130
     assert sorted(said - set(GERMAN)) == []
     assert sorted(set(GERMAN) - said) == []

@@ -17,7 +17,7 @@ from typing import Any
 from racecraft.course.phrases import learner_language, said_in
 from racecraft.course.progress import record_exercise
 from racecraft.course.verdict import Verdict, wrong
-from racecraft.errors import ConfigError, RacecraftError, did_you_mean, printable
+from racecraft.errors import ConfigError, RacecraftError, RewardError, did_you_mean, printable
 from racecraft.reward.params import TEMPLATE
 
 Check = Callable[[Any], Verdict]
@@ -36,6 +36,9 @@ def check(exercise: str, answer: Any) -> Verdict:
     judge = _find(exercise)
     try:
         verdict = judge(answer)
+    except RewardError as error:
+        what, _, called_with = str(error).partition("\n")
+        return wrong(f"It cannot be tried as a reward: {what}\n{called_with}".rstrip())
     except RacecraftError as error:
         return wrong(f"It cannot be tried: {error} {error.hint}".rstrip())
     except KeyError as error:

@@ -52,7 +52,8 @@ def _check_update(update: Callable[..., Any], future: str, *, of_next: float) ->
     if not np.isclose(ending, before + ALPHA * (reward - before)):
         return wrong(
             f"Right while it goes on; but where the episode has ended it made {ending:g} instead of "
-            f"{before + ALPHA * (reward - before):g}: nothing comes after the end, so its worth is 0."
+            f"{before + ALPHA * (reward - before):g}: nothing comes after the end, so its worth is 0, and the reward "
+            "of the last step counts as ever."
         )
     return right("A step of the way towards what the world has answered.")
 
@@ -64,9 +65,9 @@ def _try(update: Callable[..., Any], *, is_sarsa: bool, terminated: bool) -> flo
     arguments = (0, 1, -2.0, 1, 0) if is_sarsa else (0, 1, -2.0, 1)
     update(values, *arguments, terminated, ALPHA, GAMMA)
     changed = np.argwhere(values != before).tolist()
-    if not changed:
+    if not changed and not terminated:
         return wrong("The table is as it was: change it in place, values[state, action] = … or += …")
-    if changed != [[0, 1]]:
+    if changed not in ([[0, 1]], []):
         return wrong(f"It changed cells {changed}; only values[state, action], here [0, 1], was tried and may change.")
     return float(values[0, 1])
 
@@ -84,8 +85,8 @@ def check_bellman(backup: Callable[..., Any]) -> Verdict:
         truth = np.array([_backup(table[state], truth, 0.95) for state in range(16)])
     if not np.isfinite(values).all() or values.max() > 10.0:
         return wrong(
-            f"The worth grows to {values.max():.3g}, and no square is worth more than the one reward of 1: where an "
-            "outcome ends the episode, nothing comes after it, and gamma must be there where it goes on."
+            f"The worth grows to {values.max():.3g}, and no square is worth more than the one reward of 1: weigh every "
+            "outcome with its probability, and take the best of the actions, not the sum of all."
         )
     if np.allclose(values, truth, atol=1e-3):
         return right(f"The start is worth {values[0]:.3f}, as dynamic programming has it.")
@@ -96,6 +97,14 @@ def check_bellman(backup: Callable[..., Any]) -> Verdict:
         return wrong(
             f"The start is worth {values[0]:.3f}: that is the mean over the actions, what somebody who chooses by lot "
             f"would get. Whoever chooses well gets {truth[0]:.3f}: take the max."
+        )
+    patient = np.zeros(16)
+    for _ in range(400):
+        patient = np.array([_backup(table[state], patient, 1.0) for state in range(16)])
+    if np.allclose(values, patient, atol=1e-3):
+        return wrong(
+            f"The start would be worth {values[0]:.3f}, however long the way from there is, and truly it is worth "
+            f"{truth[0]:.3f}: what comes a step later counts gamma of it."
         )
     if (values > truth + 1e-3).any():
         return wrong(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +21,9 @@ def check_cuts(cuts: Any) -> Verdict:
     """Edges for three numbers: few cells, and it drives."""
     if not isinstance(cuts, dict) or set(cuts) != set(NAMES):
         return wrong(f"It must be a dictionary with the keys {', '.join(NAMES)}; () for a number that is left out.")
+    for name, row in cuts.items():
+        if not isinstance(row, Iterable):
+            return wrong(f"{name} is {row!r}; edges stand in brackets, a single one with a comma behind it: (0.0,).")
     edges: dict[str, Sequence[float]] = {name: [float(edge) for edge in cuts[name]] for name in NAMES}
     for name, row in edges.items():
         if not all(np.isfinite(row)) or list(row) != sorted(set(row)):

@@ -29,12 +29,14 @@ def check_cell(cell: Callable[..., Any]) -> Verdict:
         return wrong(
             f"With {bins} bins for each of two numbers the last cell is {bins**2 - 1}; it returned {max(numbers)}."
         )
-    edges = [cell(np.array(place), low.copy(), high.copy(), bins) for place in ([0.6, 0.07], [0.6, -0.07], [0.7, 0.0])]
-    if not all(0 <= int(edge) < bins**2 for edge in edges) or int(edges[0]) != int(cell(middles[-1], low, high, bins)):
-        return wrong(
-            f"At the very top, {[0.6, 0.07]}, it returned {edges[0]}: a value on the upper bound, or beyond it, "
-            "belongs to the last interval. min(index, bins - 1) sees to that."
-        )
+    half = 0.5 * (high - low) / bins
+    for place in ([0.6, 0.07], [0.6, -0.063], [0.7, 0.007]):
+        edge = cell(np.array(place), low.copy(), high.copy(), bins)
+        if int(edge) != int(cell(np.clip(place, low + half, high - half), low.copy(), high.copy(), bins)):
+            return wrong(
+                f"At {place} it returned {edge}: a value on the upper bound of 0.6 and 0.07, or beyond it, belongs to "
+                "the last interval. min(index, bins - 1) sees to that."
+            )
     three = {
         int(cell(np.array([a, b, c]) + 0.5, np.zeros(3), np.full(3, 4.0), 4))
         for a in range(4) for b in range(4) for c in range(4)

@@ -68,6 +68,8 @@ def check_step(step: Callable[..., Any]) -> Verdict:
         return wrong(
             "It praises with the whole reward. Only what is better than expected deserves praise: reward - baseline."
         )
+    if np.allclose(moved, 0.0):
+        return wrong("The preferences are as they were: the machine that was pulled should become likelier here.")
     if np.allclose(np.delete(moved, ACTION), 0.0):
         return wrong(
             "Only the machine that was pulled changes. Chances sum to one, so the others fall: the gradient of the "

@@ -38,9 +38,11 @@ def check_gain(gain: Callable[..., Any]) -> Verdict:
             f"A good action that became 1.5 times as likely counts {found[3]:g}: you take the larger of the two, the "
             "hopeful one. PPO takes the smaller one, and is careful."
         )
+    step = int(np.flatnonzero(~np.isclose(found, np.minimum(free, held)))[0])
     return wrong(
-        f"A ratio of 1.5 with an advantage of 2 should count {1.2 * 2.0:g} and counts {found[3]:g}; with an advantage "
-        f"of -2 it should count -3 and counts {found[6]:g}."
+        f"A ratio of {RATIOS[step]:g} with an advantage of {ADVANTAGES[step]:g} should count "
+        f"{min(free[step], held[step]):g} and counts {found[step]:g}: the smaller of the clipped and the unclipped "
+        "product, and both limits clip."
     )
 
 

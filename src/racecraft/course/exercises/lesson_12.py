@@ -27,7 +27,7 @@ def check_ranges(ranges: Any) -> Verdict:
             return wrong(f"{name} is {ends!r}; it must be two numbers, the lowest and the highest.")
         low, high = map(float, ends)
         least, most = min(cars), max(cars)
-        if low > high:
+        if not low <= high:
             return wrong(f"{name} goes from {low:g} to {high:g}: write the lower end first.")
         if low == high:
             return wrong(
@@ -40,6 +40,8 @@ def check_ranges(ranges: Any) -> Verdict:
                 f"A car with {name} {outside:g} was measured, and {low:g} to {high:g} leaves it out: it would meet "
                 "something there that it never saw."
             )
+        if low < 0.0 < least:
+            return wrong(f"{name} begins at {low:g}, and no car has less than nothing of it.")
         if high - low > WIDEST * (most - least):
             return wrong(
                 f"{name} from {low:g} to {high:g} holds all five, and much that no car is like: a driver that is ready "
