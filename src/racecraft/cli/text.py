@@ -350,6 +350,9 @@ def say_replayed(result: Comparison, picture: Path | None) -> None:
         _say_errors(console, {"median": _medians(found), "90 %": _medians(found, "_p90")})
     for note in (*result.differences.shown(10), *result.faults.notes[:5]):
         _say(console, (f"  {note}", "dim"))
+    if result.rules.unseen:
+        ended = f"{result.rules.unseen:,} of the episodes ended by a crash or the clock."
+        _say(console, f"{ended} A log shows no boxes, other cars or clock, so these ends are not compared.")
     _say_moved(console, result.moved)
     if result.faults.count:
         _say(console, (f"{result.faults.count:,} rows could not be read.", "bold yellow"))

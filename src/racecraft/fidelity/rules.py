@@ -23,6 +23,8 @@ PROGRESS_TOLERANCE: Final = 1e-5
 FAR_OFF: Final = 0.5
 """m beyond the border; an episode ends before."""
 _COLUMN: Final = {name: index for index, name in enumerate(ROW_COLUMNS)}
+UNSEEN: Final = ("crashed", "time_up")
+"""Ends by what a log does not show: boxes, other cars and the race's clock."""
 _OVER: Final = [STATUS_NAMES.index(name) for name in ("lap_complete", "off_track", "immobilized", "reversed")]
 
 
@@ -97,6 +99,7 @@ class RulesAgreement:
     reversed: int = 0  # driven against the route's direction
     ends: int = 0
     episodes: int = 0  # that ended in the log
+    unseen: int = 0  # of these, by what it does not show, with nothing before that would have ended them here
 
     def add(self, rules: TrackRules, log: Log, rows: NDArray[np.float64], differences: Differences) -> None:
         """Compare some episodes with what `TrackRules.judge` made of them."""
@@ -148,6 +151,9 @@ class RulesAgreement:
                 for row in np.flatnonzero(is_over[begin:last]) + begin
                 if STATUS_NAMES[codes[row]] != log.status[row] and not log.is_paused[row]
             ]
+            if logged in UNSEEN and not early:
+                self.unseen += 1
+                continue
             ours = STATUS_NAMES[codes[last]]
             if not early and (ours == logged if logged else is_over[last]):
                 self.ends += 1
