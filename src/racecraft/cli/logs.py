@@ -97,6 +97,10 @@ def calibrate(
     from racecraft.fidelity import calibrate as fit
 
     result = fit(logs, vehicle=vehicle, track=track or None)
+    try:  # a fit takes minutes: it is not lost for want of a folder
+        output.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{output} cannot be written: {error.strerror or error}.") from error
     result.vehicle.save(output)
     if as_json:
         print_json({**result.to_dict(), "file": str(output)})
