@@ -449,10 +449,10 @@ def test_the_verbs(lines, tmp_path, monkeypatch):
     assert done.exit_code == 0
     assert "progress" in done.stdout
     assert (tmp_path / "replay.png").exists()
-    done = CliRunner().invoke(every_verb(), ["calibrate", path, "--track", "oval", "--output", "car.json"])
+    done = CliRunner().invoke(every_verb(), ["calibrate", path, "--track", "oval", "--output", "my cars/car.json"])
     assert done.exit_code == 0
     assert "car.json" in done.stdout
-    assert json.loads((tmp_path / "car.json").read_text())["mass"] == 7.5
+    assert json.loads((tmp_path / "my cars" / "car.json").read_text())["mass"] == 7.5
 
 
 def test_episodes_are_handed_on_whole(lines, tmp_path, monkeypatch):
