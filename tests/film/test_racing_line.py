@@ -11,6 +11,7 @@ from racecraft.film.racing_line import (
     speed_range,
 )
 from racecraft.race import Autopilot, RaceRules, Recording, evaluate
+from racecraft.race.rules import race_rules
 from racecraft.track import TrackPicture, load_track
 
 OVAL = load_track("oval")
@@ -53,6 +54,24 @@ def test_mistakes_are_marked_and_lines_do_not_jump(tmp_path):
     recording = record(lambda state: np.tile(np.float32([0, 1]), (len(state), 1)), laps=1, offtrack_penalty=1.0)
     with Image.open(draw_racing_line(recording, tmp_path / "line.png", width_px=640)) as image:
         assert share_of(image.convert("RGB"), MISTAKE) > 1e-3
+
+
+def test_a_trial_that_ends_by_a_mistake_behind_its_start(tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(TrackPicture, "caption", lambda self, **told: shown.append(dict(told["figures"])))
+
+    def turns(state):
+        return np.tile(np.float32([0.52, 1.0]), (len(state), 1))
+
+    track = load_track("speedway")
+    rules = race_rules("drfc", {"laps": 1, "max_resets": 0})
+    trials = evaluate(turns, track, rules=rules, num_trials=2, sees="state").trials
+    assert trials[1].recording.column("progress")[-1] < 0
+    for trial in trials:
+        draw_racing_line(trial.recording, tmp_path / "line.png", width_px=640)
+    assert [figures["COMPLETION"] for figures in shown] == ["0.0 %", "0.0 %"]
+    assert [trial.laps[0].resets for trial in trials] == [0, 0]
+    assert not any("RESETS" in figures for figures in shown)
 
 
 def test_two_steps_are_the_least(tmp_path):

@@ -145,13 +145,14 @@ def _figures(recording: Recording) -> list[tuple[str, str]]:
         figures.append(("BEST LAP", f"{min(times):.3f} s"))
         figures.append(("LAPS", str(len(times))))
     else:
-        figures.append(("COMPLETION", f"{100 * float(recording.column('progress')[-1]):.1f} %"))
+        reached = float(recording.column("progress")[-1].clip(0.0, 1.0))  # a car may end behind its start
+        figures.append(("COMPLETION", f"{100 * reached:.1f} %"))
     figures.append(("TOP SPEED", f"{speeds.max():.2f} m/s"))
     moving = speeds[recording.column("status") == 1]
     figures.append(("MEAN SPEED", f"{moving.mean() if len(moving) else 0.0:.2f} m/s"))
-    mistakes = len(_mistakes(recording))
-    if mistakes:
-        figures.append(("RESETS", str(mistakes)))
+    resets = sum(step < len(recording) - 1 for step in _mistakes(recording))  # after the last one nothing follows
+    if resets:
+        figures.append(("RESETS", str(resets)))
     return figures
 
 
