@@ -98,6 +98,15 @@ def test_damaged_run_json(tmp_path, text):
         RunFolder.open(tmp_path).read_info()
 
 
+@pytest.mark.parametrize(("name", "value"), [("created", 5), ("versions", "x"), ("parent", "b@4096"), ("seed", "1")])
+def test_a_value_of_another_kind_in_run_json_is_named(tmp_path, name, value):
+    RunFolder(tmp_path).write_info(RunInfo(seed=1, track="oval", track_digest=""))
+    document = json.loads((tmp_path / "run.json").read_text())
+    (tmp_path / "run.json").write_text(json.dumps({**document, name: value}))
+    with pytest.raises(RunError, match=rf"cannot be opened: {name} in run\.json is {value!r}\."):
+        RunFolder.open(tmp_path).read_info()
+
+
 def test_damaged_inputs(tmp_path):
     run = RunFolder(tmp_path)
     with pytest.raises(RunError, match="cannot be read"):

@@ -266,6 +266,9 @@ class RunFolder:
                 ("track", str),
                 ("track_digest", str),
                 ("settings", dict),
+                ("created", str),
+                ("versions", dict),
+                ("parent", dict | None),
                 ("foreign", bool),
             ):
                 if not isinstance(getattr(info, name), kind):
