@@ -7,7 +7,7 @@ The same version gives the same files to the bit: trainings end after so many st
 to float16 where that costs no lap, for half of the bytes in the package, and read as float32. The last line on stdout
 is JSON: file and SHA-256 of the weights by starter.
 
-Who is to be fast on one road, once somebody trains it there, brings a teacher along: trained on the same roads, but
+Who is to be fast on one road, once somebody trains it there, brings a teacher along: trained on many roads as well, but
 paid by the metre alone. What its run says of reward and settings is how it goes on, not how it learned so far.
 """
 
@@ -35,6 +35,7 @@ from racecraft.sim.objects import NO_OBJECTS, Objects, Obstacles
 from racecraft.track import joint_digest
 from racecraft.training.parent import WEIGHTS
 from racecraft.training.plan import make_plan
+from racecraft.training.recipes import ROADS
 from racecraft.training.start import read_settings
 from racecraft.training.taught import taught, teachers_arrays
 
@@ -42,10 +43,11 @@ BOXES = Objects(obstacles=Obstacles(placement="random"))
 
 
 class Teacher(NamedTuple):
-    """Of who goes on with a starter on one road: what it is paid for, also afterwards, and how long it learns."""
+    """Of who goes on with a starter on one road: what it is paid for, also afterwards, how long it learns, and where."""
 
     reward: str
     lessons: DistillConfig
+    roads: tuple[str, ...] = ROADS
 
 
 class Starter(NamedTuple):
@@ -100,9 +102,9 @@ def main() -> None:
 def teachers_weights(starter: Starter, num_threads: int, scratch: Path) -> dict[str, NDArray[Any]]:
     """A teacher of many roads, as a checkpoint names it; its student sees just as much as it takes to save one."""
     assert starter.teacher is not None
-    reward, lessons = starter.teacher
+    reward, lessons, roads = starter.teacher
     settings = {"recipe": starter.recipe, "reward": reward, "distill": lessons, "until": "512 steps", "seed": SEED}
-    trained = train(**settings, num_threads=num_threads, root=scratch, name="teacher")
+    trained = train(roads, **settings, num_threads=num_threads, root=scratch, name="teacher")
     run = RunFolder.open(trained.run)
     arrays = teachers_arrays(run.checkpoints.load("last"), read_settings(run), run.read_model_metadata())
     return {name: halves(name, array) for name, array in arrays.items()}

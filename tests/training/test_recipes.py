@@ -15,7 +15,7 @@ from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.track import load_tracks
 from racecraft.training import train
-from racecraft.training.recipes import RECIPES, TRAFFIC, WIDE_ROADS, with_recipe
+from racecraft.training.recipes import FOLDED_ROADS, RECIPES, TRAFFIC, WIDE_ROADS, with_recipe
 from racecraft.training.start import read_settings
 
 
@@ -57,3 +57,13 @@ def test_traffic_is_learned_on_roads_with_room(tmp_path: Path) -> None:
     assert settings.distill == RECIPES["traffic"]["distill"]
     assert folder.read_reward_function() == load_reward("dodge")
     assert [track for track in load_tracks(WIDE_ROADS) if not 0.89 < track.mean_width < 1.11] == []
+
+
+@pytest.mark.costly
+def test_everywhere_is_learned_on_folded_roads_too() -> None:
+    assert RECIPES["everywhere"]["track"] == FOLDED_ROADS
+    tracks = load_tracks(FOLDED_ROADS)
+    assert len({track.digest for track in tracks}) == len(tracks) == 82
+    folded = {track.name: track.mean_width for track in tracks if "verge=0.3" in track.name}
+    assert sorted({round(width, 2) for width in folded.values()}) == [0.7, 1.07]
+    assert sum(width > 1.0 for width in folded.values()) == 20

@@ -12,6 +12,14 @@ from racecraft.sim.objects import Bots, Objects, Obstacles
 ROADS: Final = ("library", "generated:0..47,radius=0.45,difficulty=0.9")
 """Many and tight; of the official routes only `reinvent_2018`'s shape is among them."""
 
+FOLDED_ROADS: Final = (
+    "library",
+    "generated:0..31,radius=0.45,difficulty=0.9",
+    "generated:32..51,width=1.07,radius=0.45,difficulty=1,verge=0.3",
+    "generated:52..63,width=0.7,radius=0.45,difficulty=1,verge=0.3",
+)
+"""More of them, and hairpins one behind the other: on wide roads, as most of the official ones are, and on narrow ones."""
+
 WIDE_ROADS: Final = ("generated:0..23,width=0.9,radius=0.5", "generated:24..47,width=1.1,radius=0.5")
 """With room to pass a box: as wide as the official routes that races among objects used."""
 
@@ -34,7 +42,7 @@ RECIPES: Final[Mapping[str, Mapping[str, Any]]] = {
     # Fast on roads it has never seen: a teacher that knows the road, on many of them and both ways, and a student that
     # sees it, under conditions that differ from episode to episode. docs/log/generalisation.md has what led here.
     "everywhere": {
-        "track": ROADS,
+        "track": FOLDED_ROADS,
         "reward": "touring",
         "actions": "continuous",
         "algorithm": "distill",
