@@ -43,7 +43,7 @@ BOXES = Objects(obstacles=Obstacles(placement="random"))
 
 
 class Teacher(NamedTuple):
-    """Of who goes on with a starter on one road: what it is paid for, also afterwards, how long it learns, and where."""
+    """Of who goes on with a starter on one road: what it is paid for, also afterwards, how long it learns and where."""
 
     reward: str
     lessons: DistillConfig

@@ -18,7 +18,7 @@ FOLDED_ROADS: Final = (
     "generated:32..51,width=1.07,radius=0.45,difficulty=1,verge=0.3",
     "generated:52..63,width=0.7,radius=0.45,difficulty=1,verge=0.3",
 )
-"""More of them, and hairpins one behind the other: on wide roads, as most of the official ones are, and on narrow ones."""
+"""More, and hairpins one behind the other: on wide roads, as most of the official ones are, and on narrow ones."""
 
 WIDE_ROADS: Final = ("generated:0..23,width=0.9,radius=0.5", "generated:24..47,width=1.1,radius=0.5")
 """With room to pass a box: as wide as the official routes that races among objects used."""
