@@ -79,6 +79,15 @@ def test_laps_are_read_back(tmp_path: Path, oval: Track) -> None:
     assert backwards.point_at(1.0) == pytest.approx(oval.point_at(1.0), abs=0.05)
 
 
+def test_a_lap_that_flows_into_the_next_is_whole_in_the_originals_words(tmp_path: Path, oval: Track) -> None:
+    path = tmp_path / "0-iteration.csv"
+    write_trace(path, oval, [(2.0, "in_progress", 1.0), (2.0, "lap_complete", 1.0), (1.0, "in_progress", 0.4)])
+    assert [lap.is_complete for lap in read_laps(path)] == [True, True, False]
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    path.write_text("".join(",".join(row[:15]) + "\n" for row in rows))  # as in 2019, without a status
+    assert [lap.is_complete for lap in read_laps(path)] == [True, True, False]
+
+
 def test_an_old_picture_was_taken_on_the_way_to_where_the_car_is(tmp_path: Path, oval: Track) -> None:
     path = tmp_path / "0-iteration.csv"
     write_trace(path, oval, [(2.0, "lap_complete", 1.0)])

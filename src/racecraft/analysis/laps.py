@@ -36,7 +36,7 @@ class TracedLap:
     number: int
     """Within the trace, from 1, as AWS counts trials."""
     status: str
-    """Of its last row."""
+    """Of its last row; of a whole lap ``lap_complete``, whatever a simulator wrote there."""
     time: Floats
     """s since its first row  (R,)."""
     share: Floats
@@ -123,13 +123,17 @@ def split_laps(columns: dict[str, NDArray[Any]]) -> list[TracedLap]:
         points = np.column_stack([columns["X"][rows], columns["Y"][rows]]).astype(np.float64)
         is_paused = np.zeros(end - begin, bool) if statuses is None else statuses[rows] == "pause"
         is_put = (is_paused[1:] & ~is_paused[:-1]) | (np.hypot(*np.diff(points, axis=0).T) > JUMP)
+        share = np.maximum.accumulate(np.clip(columns["progress"][rows] / 100.0, 0.0, 1.0))
+        status = str(statuses[end - 1]) if statuses is not None else ""
+        if status in ("", "in_progress") and share[-1] >= 1.0:  # AWS's word for a lap that flows into the next
+            status = "lap_complete"
         stands = np.zeros(end - begin, bool) if statuses is None else np.isin(statuses[rows], STANDING)
         laps.append(
             TracedLap(
                 number=int(episode[begin]) + 1,
-                status=str(statuses[end - 1]) if statuses is not None else "",
+                status=status,
                 time=time - time[0],
-                share=np.maximum.accumulate(np.clip(columns["progress"][rows] / 100.0, 0.0, 1.0)),
+                share=share,
                 points=points,
                 heading=np.radians(columns["yaw"][rows]),
                 steering_angle=np.radians(columns["steer"][rows]),
