@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
 from racecraft.site.__main__ import python_files
+from racecraft.site.calls import Paying
 
 
 def test_the_shipped_files_need_python_alone(tmp_path: Path) -> None:
@@ -20,3 +22,14 @@ def test_the_shipped_files_need_python_alone(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-I", "-S", "-c", begin], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert Path(done.stdout.strip()).is_relative_to(tmp_path)
+
+
+def test_a_function_is_known_to_remember_where_it_does() -> None:
+    asked = {"waypoints": [[[0.0, 0.0], [1.0, 0.0]]], "numCars": 1, "numColumns": 1, "seed": 0}
+    counting = "n = 0\ndef reward_function(params):\n    global n\n    n += 1\n    return float(n)\n"
+    for source, remembers in (
+        (counting, True),
+        ("def reward_function(params):\n    return 1.0\n", False),
+        ("x =", False),
+    ):
+        assert Paying(json.dumps({**asked, "source": source})).remembers is remembers

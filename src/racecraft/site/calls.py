@@ -171,6 +171,7 @@ class Paying:
             self._calls = Calls(asked["source"], asked["waypoints"], num_cars=count, seed=asked["seed"])
         except Failed as failed:
             self.failure = str(failed)
+        self.remembers = not self.failure and keeps_state(asked["source"])
 
     def pay(self) -> str:
         """Rewards of the rows; a failure's text, or nothing."""

@@ -14,8 +14,8 @@ export const de: Record<TabKey, string> = {
   stop: "Anhalten",
   loading: "Der Simulator wird geladen …",
   learning: "{count} {count|Auto lernt|Autos lernen zugleich}",
-  ready: "64 Autos warten auf dich.",
-  shown: "Es hat schon gelernt; 64 andere warten.",
+  ready: "{count} {count|Auto wartet|Autos warten} auf dich.",
+  shown: "Es hat schon gelernt; {count} {count|anderes wartet|andere warten}.",
   reached: "Es fährt {laps} von {laps} {laps|Runde|Runden} nach {time}.",
   unreached: "{time}, und es fährt noch nicht jede Runde. Eine andere Belohnung oder Strecke ist vielleicht leichter.",
   stopped: "Angehalten nach {time}.",
@@ -84,6 +84,7 @@ export const de: Record<TabKey, string> = {
   own_lead:
     "Python wie bei AWS: reward_function(params) gibt für jeden Schritt eine Zahl. Sie läuft nur in diesem Tab.",
   change: "Ändern",
+  replaced: "Die Belohnung, die du geschrieben hattest, ist ersetzt.",
   python_loading: "Python wird geladen …",
   python_unable: "Python ließ sich nicht laden: {why} Es wird wieder versucht, sobald sich die Belohnung ändert.",
   python_broken: "An dieser Funktion ist Python zerbrochen: {why}.",

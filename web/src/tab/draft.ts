@@ -3,7 +3,7 @@ import { browser, tab } from "../lib/remembered";
 
 const KEY = "racecraft-tab-reward";
 
-const BEGINNING = `def reward_function(params):
+export const BEGINNING = `def reward_function(params):
     """Stay near the middle, and hurry."""
     share = params["distance_from_center"] / (0.5 * params["track_width"])
     return max(1 - share, 0.001) * params["speed"]

@@ -75,6 +75,7 @@ export class Lesson {
   threads = $state(1);
   failure = $state("");
   failedReward = $state(""); // what a reward of one's own did wrong
+  failedSource = $state(""); // its text
   printed = $state(""); // by it, the last of it
   isPythonReady = $state(false);
   pythonFailure = $state(""); // why it did not come; it is asked for again when it is needed again
@@ -210,8 +211,12 @@ export class Lesson {
     return this.isRunning && this.running === kind;
   }
 
+  private blame(message: string): void {
+    [this.failedReward, this.failedSource] = [message, this.started?.reward ?? ""];
+  }
+
   private hang(): void {
-    this.failedReward = `reward_function.py: the reward function did not return within ${PATIENCE} s.`;
+    this.blame(`reward_function.py: the reward function did not return within ${PATIENCE} s.`);
     this.end("failed");
   }
 
@@ -305,7 +310,7 @@ export class Lesson {
         break;
       case "failed":
         if (kind === "python" && !this.isTraining("python")) return this.give(report.message);
-        if (report.isReward) this.failedReward = report.message;
+        if (report.isReward) this.blame(report.message);
         else this.failure = report.message;
         this.end("failed");
     }

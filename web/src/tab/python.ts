@@ -11,6 +11,7 @@ interface Paying extends PyProxy {
   rows: PyProxy;
   rewards: PyProxy;
   failure: string;
+  remembers: boolean;
   pay(): string;
   printed(): string;
 }
@@ -18,6 +19,7 @@ interface Paying extends PyProxy {
 export interface Paid {
   pay: Pay;
   printed: () => string;
+  /** Whether an earlier step changes what it pays for a later one. */ remembers: boolean;
 }
 
 interface Calls extends PyProxy {
@@ -76,6 +78,7 @@ export class Python {
     };
     return {
       printed: () => paying.printed(),
+      remembers: paying.remembers,
       pay: (seen) => {
         over(rows, (data) => data.set(seen));
         const failure = paying.pay();

@@ -8,7 +8,7 @@ export function saidOf(lesson: Lesson, cars: number): string {
   const time = seconds(lesson.seconds, 1);
   switch (lesson.state) {
     case "ready":
-      return l(lesson.look ? "shown" : "ready");
+      return l(lesson.look ? "shown" : "ready", { count: cars });
     case "loading":
       return l("loading");
     case "learning":

@@ -167,7 +167,7 @@ export type Report =
   | { kind: "verified"; verdict: Verdict }
   | { kind: "laps"; found: EvaluationLaps; toPay: ToPay[] }
   | { kind: "eyes"; lap: number; eyes: Eyes | undefined }
-  | { kind: "paid"; rewards: (number | null)[][] }
+  | { kind: "paid"; rewards: (number | null)[][]; isAfresh: boolean }
   | { kind: "unreadable"; key: ProblemKey; values: Record<string, string | number> }
   | { kind: "failed"; message: string; isReward: boolean };
 
@@ -317,8 +317,8 @@ function lookAtReplay(replay: Watched): void {
 async function payFor({ source, track, laps }: PayLaps, { python }: Loaded): Promise<void> {
   const { payLaps } = await import("./laps/paid");
   const width = laps.flatMap(({ rows }) => rows)[0]?.length ?? 0;
-  const paid = width ? payLaps(python!.open(source, track, 1, width, 0).pay, laps) : [];
-  tell({ kind: "paid", rewards: paid });
+  const own = width ? python!.open(source, track, 1, width, 0) : undefined;
+  tell({ kind: "paid", rewards: own ? payLaps(own.pay, laps) : [], isAfresh: own?.remembers ?? false });
 }
 
 async function load({ site, hasPython, isTeam }: Load): Promise<Loaded> {

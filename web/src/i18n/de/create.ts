@@ -165,6 +165,7 @@ export const create: Record<keyof typeof english, string> = {
     "Die Funktion scheitert unterwegs, also ist nur gemalt, was davor war. Ein Training kann dort enden.",
   painting_objects: "Dunkle Quadrate sind die Kisten und Autos, wo sie zu Beginn einer Episode stehen.",
   painting_high: "viel",
+  painting_flat: "überall {reward}",
   checking: "Prüft …",
   reward_empty: "Schreibe eine Belohnungsfunktion oder wähle eine Vorlage.",
   reward_faulty: "In der Belohnungsfunktion ist ein Fehler.",

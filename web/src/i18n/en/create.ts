@@ -162,6 +162,7 @@ export const create = {
     "The function fails on the way round, so only what came before that is painted. A training may end there.",
   painting_objects: "Dark squares are the boxes and cars, where an episode has them at its beginning.",
   painting_high: "most",
+  painting_flat: "{reward} everywhere",
   checking: "Checking…",
   reward_empty: "Write a reward function, or choose a preset.",
   reward_faulty: "There is a mistake in the reward function.",

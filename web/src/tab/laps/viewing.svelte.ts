@@ -116,9 +116,9 @@ export class Viewing {
       timer = window.setTimeout(() => failed(new Error(l("watch_late"))), PATIENCE);
     });
     try {
-      const { rewards } = await Promise.race([payer.ask({ kind: "pay", source, track, laps }, "paid"), late]);
+      const { rewards, isAfresh } = await Promise.race([payer.ask({ kind: "pay", source, track, laps }, "paid"), late]);
       const paid = this.found.laps.map((lap, at) => ({ ...lap, reward: rewards[at]! }));
-      this.found = { ...this.found, laps: paid, reward: { ...this.found.reward, error: null, is_afresh: true } };
+      this.found = { ...this.found, laps: paid, reward: { ...this.found.reward, error: null, is_afresh: isAfresh } };
     } catch (error) {
       say(error instanceof Error ? error.message.split("\n")[0]! : String(error));
     } finally {
