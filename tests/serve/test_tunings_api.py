@@ -12,13 +12,13 @@ pytest.importorskip("optuna")
 
 pytestmark = pytest.mark.costly
 
-REWARD = """BONUS = 2.0
+REWARD = """PRÄMIE = 2.0
 STEPS = 3
 ZERO = 0.0
 
 
 def reward_function(params):
-    return float(params["speed"] * BONUS * STEPS + ZERO)
+    return float(params["speed"] * PRÄMIE * STEPS + ZERO)
 """
 GAMMA = {"name": "gamma", "low": 0.95, "high": 0.99}
 
@@ -35,11 +35,11 @@ def model(console: RunningConsole) -> str:
 
 def test_what_may_be_searched(console: RunningConsole, model: str) -> None:
     space = {n["name"]: n for n in console.client.get(f"/api/models/{model}/tunings/space").json()}
-    assert list(space)[:2] == ["BONUS", "STEPS"]
-    assert (space["BONUS"]["low"], space["BONUS"]["high"], space["BONUS"]["default"]) == (0.5, 8.0, 2.0)
+    assert list(space)[:2] == ["PRÄMIE", "STEPS"]
+    assert (space["PRÄMIE"]["low"], space["PRÄMIE"]["high"], space["PRÄMIE"]["default"]) == (0.5, 8.0, 2.0)
     assert space["STEPS"]["is_whole"]
     assert {name for name, number in space.items() if number["is_usual"]} == {
-        "BONUS", "STEPS", "learning_rate", "gamma", "ent_coef"
+        "PRÄMIE", "STEPS", "learning_rate", "gamma", "ent_coef"
     }  # fmt: skip
     for number in space.values():
         assert number["low"] <= number["default"] <= number["high"]
@@ -63,7 +63,7 @@ def test_a_search_tells_what_of_the_models_files_has_no_effect(console: RunningC
 @pytest.mark.slow
 def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, model: str) -> None:
     client, path = console.client, f"/api/models/{model}/tunings"
-    search = [{"name": "BONUS", "low": 1, "high": 4}, GAMMA]
+    search = [{"name": "PRÄMIE", "low": 1, "high": 4}, GAMMA]
     with full(console, "train"):
         job = client.post(path, json={"search": search, "trials": 2, "trial_steps": 2000, "minutes": 5})
         assert job.status_code == 202, job.text
@@ -76,8 +76,8 @@ def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, mode
     assert ended["result"]["trials"] == 2
     card = client.get(path).json()[0]
     first, second = card["trials"]
-    assert first["params"] == {"BONUS": 2.0, "gamma": pytest.approx(0.98, abs=0.02)}
-    assert 1 <= second["params"]["BONUS"] <= 4
+    assert first["params"] == {"PRÄMIE": 2.0, "gamma": pytest.approx(0.98, abs=0.02)}
+    assert 1 <= second["params"]["PRÄMIE"] <= 4
     best = min(card["trials"], key=lambda trial: trial["value"])
     assert card["best"] == best["number"]
 
@@ -86,7 +86,7 @@ def test_a_search_whose_best_trial_becomes_a_model(console: RunningConsole, mode
     assert kept["steps"] == best["steps"]
     detail = client.get(f"/api/models/{kept['name']}").json()
     assert detail["settings"]["ppo"]["gamma"] == best["params"]["gamma"]
-    assert f"BONUS = {best['params']['BONUS']!r}" in detail["reward"]
+    assert f"PRÄMIE = {best['params']['PRÄMIE']!r}" in detail["reward"]
     assert detail["checkpoints"]
     assert client.post(f"{path}/{card['id']}/keep", json={"trial": 1}).json()["name"] == f"{model}-tuned-2"
     refused(client.post(f"{path}/{card['id']}/keep", json={"name": model}), 409, "already")

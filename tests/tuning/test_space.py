@@ -25,6 +25,12 @@ def test_bounds_are_taken_as_said() -> None:
     assert (found["K"].low, found["K"].high, found["K"].is_log) == (0.001, 10.0, True)
 
 
+def test_names_may_have_letters_of_any_language() -> None:
+    assert list(space(constants={"GRÖSSE": 2.0, "速度": 1.0}))[:2] == ["GRÖSSE", "速度"]
+    decomposed = space("GRO\u0308SSE=1..4", constants={"GRÖSSE": 2.0})  # as a terminal of macOS may hand it on
+    assert (decomposed["GRÖSSE"].low, decomposed["GRÖSSE"].high) == (1.0, 4.0)
+
+
 def test_every_hyperparameter_that_may_be_searched_is_one_and_its_default_is_within_reach() -> None:
     for name in HYPERPARAMETERS:
         parameter = space(name)[name]

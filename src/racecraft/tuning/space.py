@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal, Self
@@ -17,10 +18,8 @@ MAX_CONSTANTS: Final = 8
 SPREAD: Final = 4.0
 """A constant is searched from a quarter of its value to four times it."""
 
-_NUMBER: Final = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-_SEARCH: Final = re.compile(
-    rf"\s*([A-Za-z_]\w*)\s*(?:=\s*({_NUMBER})\s*\.\.\s*({_NUMBER})\s*)?", re.ASCII | re.IGNORECASE
-)
+_NUMBER: Final = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?"
+_SEARCH: Final = re.compile(rf"\s*([^\W\d]\w*)\s*(?:=\s*({_NUMBER})\s*\.\.\s*({_NUMBER})\s*)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ def make_space(searches: Iterable[str], *, ppo: PPOConfig, constants: dict[str, 
         texts = [*chosen, *(name for name in USUAL if name not in chosen)]
     found: dict[str, Parameter] = {}
     for text in texts:
-        match = _SEARCH.fullmatch(text) if len(text) <= 200 else None
+        match = _SEARCH.fullmatch(unicodedata.normalize("NFKC", text)) if len(text) <= 200 else None  # as Python reads
         if match is None:
             raise ConfigError(f"search is {text[:200]!r}; write it like 'gamma' or 'gamma=0.9..0.99'.")
         name = match[1]

@@ -10,7 +10,7 @@ from pydantic import Field
 from racecraft.serve.schemas import Message, RunName
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Number = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Number = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\W\d]\w*$")]
 Goal = Literal["laps", "lap_time"]
 
 
