@@ -95,10 +95,10 @@ def test_python_that_does_not_come_is_told_and_asked_for_again(phone: Page) -> N
 
 
 def test_a_function_that_fails_on_the_way_is_not_painted_as_if_it_paid(phone: Page) -> None:
-    phone.get_by_text("least").wait_for()
+    phone.get_by_text("1 everywhere").wait_for()
     phone.locator(".cm-content").fill(FAILS)
     phone.get_by_text("The function fails on the way round, so there is nothing to paint.").wait_for()
-    assert phone.get_by_text("least").count() == 0
+    assert phone.get_by_text("everywhere").count() == 0
 
 
 def test_who_cannot_train_without_a_reward_is_told_so(phone: Page) -> None:
