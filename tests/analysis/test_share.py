@@ -165,6 +165,12 @@ def test_what_cannot_be_shared_is_told(run: RunFolder, stamp: str, tmp_path: Pat
         write_share(run.path, tmp_path / "file" / "s.html")
     assert write_share(run.path).read_text() == share(run, stamp)
     (run.path / "share.html").unlink()
+    later = run.path / "evaluation-29991231235959"  # of a race too long for a replay file
+    later.mkdir()
+    write_json(later / "evaluation.json", {"track": "oval"})
+    assert write_share(run.path, tmp_path / "s.html").read_text() == share(run, stamp)
+    (later / "evaluation.json").unlink()
+    later.rmdir()
     (tmp_path / "new").mkdir()
     write_json(tmp_path / "new" / "run.json", json.loads((run.path / "run.json").read_text()))
     with pytest.raises(RunError, match="no evaluation to share"):

@@ -29,7 +29,7 @@ def write_share(run: str | Path, path: str | Path | None = None, *, stamp: str =
     Args:
         run: The run folder.
         path: Where to; by default ``share.html`` in the run folder.
-        stamp: Of the evaluation; by default the newest.
+        stamp: Of the evaluation; by default the newest that has a replay.
         language: ``en`` or ``de``.
 
     Raises:
@@ -37,7 +37,11 @@ def write_share(run: str | Path, path: str | Path | None = None, *, stamp: str =
     """
     folder = RunFolder.open(run)
     if not stamp:
-        found = sorted(folder.path.glob("evaluation-*/evaluation.json"))
+        found = [
+            path
+            for path in sorted(folder.path.glob("evaluation-*/evaluation.json"))
+            if path.with_suffix(".replay").is_file()  # a very long race has none
+        ]
         if not found:
             raise RunError(
                 f"{folder.name} has no evaluation to share.", hint=f"racecraft evaluate {typed(folder.path)}"
