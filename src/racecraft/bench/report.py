@@ -6,15 +6,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 UNSHOWN = ("limits", "runs", "parts_percent", "cars", "batch", "name", "version", "observation", "num_envs")
 
 
-def table(results: dict[str, Any]) -> RenderableType:
-    """One line per figure, with the machine's limit and our share of it where there is one."""
+def table(results: dict[str, Any]) -> tuple[Table, list[Text]]:
+    """One line per figure, with the machine's limit and our share of it where there is one; and what is said below."""
     machine = results["machine"]
     view = Table(
         title=f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}",
@@ -23,8 +22,8 @@ def table(results: dict[str, Any]) -> RenderableType:
         box=SIMPLE_HEAD,
         pad_edge=False,
     )
-    view.add_column("figure", no_wrap=True)
-    view.add_column("measured", justify="right")
+    view.add_column("figure", overflow="fold", min_width=12)
+    view.add_column("measured", justify="right", no_wrap=True)
     view.add_column("limit", justify="right", no_wrap=True)
     view.add_column("share", justify="right", no_wrap=True)
     notes: list[str] = []
@@ -45,7 +44,7 @@ def table(results: dict[str, Any]) -> RenderableType:
         if parts := figures.get("parts_percent"):
             shares = ", ".join(f"{name} {share:.0f} %" for name, share in parts.items())
             notes.append(f"{group} spends its time on: {shares}")
-    return Group(view, *(Text(note, style="dim") for note in notes))
+    return view, [Text(note, style="dim") for note in notes]
 
 
 def _lines(figures: dict[str, Any], inside: str = "") -> Iterator[tuple[str, Any, dict[str, Any] | None]]:

@@ -431,7 +431,11 @@ def say_measured(results: dict[str, Any]) -> None:
     """The benchmarks."""
     from racecraft.bench import table
 
-    Console().print(table(results))
+    console = Console()
+    figures, notes = table(results)
+    show_table(console, figures)
+    for note in notes:
+        console.print(note)
 
 
 def _table(*, title: str | None = None) -> Table:
