@@ -6,6 +6,7 @@ import pytest
 from rich.console import Console
 
 from racecraft.bench import table
+from racecraft.cli.tables import show_table
 
 RESULTS: dict[str, Any] = {
     "machine": {"processor": "A processor with a long name @ 3.00 GHz", "cores": 2, "instruction_set": "avx512"},
@@ -23,8 +24,11 @@ RESULTS: dict[str, Any] = {
 
 def printed(results: dict[str, Any], width: int) -> list[str]:
     console = Console(width=width)
+    figures, notes = table(results)
     with console.capture() as capture:
-        console.print(table(results))
+        show_table(console, figures)
+        for note in notes:
+            console.print(note)
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
