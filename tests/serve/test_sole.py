@@ -106,6 +106,7 @@ def test_a_second_server_on_postgresql_is_refused_from_another_folder(postgres: 
         pass
 
 
+@pytest.mark.costly  # it waits, mostly
 def test_a_server_whose_connection_is_cut_takes_its_place_again_or_stops(
     postgres: PostgresServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
