@@ -30,18 +30,23 @@ def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None
     assert again.document["notes"] == []
 
 
+def say_one_trial(params: dict[str, float], value: float, folder: Path) -> None:
+    """The table of a search that tried these numbers alone."""
+    space = tuple(
+        Parameter(name=name, kind="constant", low=0.0, high=1.0, is_log=False, is_whole=False, default=default)
+        for name, default in params.items()
+    )
+    trial = TrialOutcome(
+        number=0, state="complete", value=value, params=params, run="r", completion=1.0,
+        best_lap_seconds=None, steps=64, seconds=1.0, error="",
+    )  # fmt: skip
+    say_tuned(Outcome(folder=folder, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
+
+
 def test_no_number_of_the_table_is_folded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names = ("OFF_TRACK_PENALTY", "BORDER_LOSS", "learning_rate", "gamma", "ent_coef")
     params = dict(zip(names, (-0.00057961, 0.1714, 0.00020281, 0.99969, 123456.0), strict=True))
-    space = tuple(
-        Parameter(name=name, kind="constant", low=0.0, high=1.0, is_log=False, is_whole=False, default=value)
-        for name, value in params.items()
-    )
-    trial = TrialOutcome(
-        number=0, state="complete", value=1.0, params=params, run="r", completion=0.02,
-        best_lap_seconds=None, steps=64, seconds=1.0, error="",
-    )  # fmt: skip
-    say_tuned(Outcome(folder=tmp_path, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
+    say_one_trial(params, 1.0, tmp_path)
     row = next(line for line in capsys.readouterr().out.splitlines() if "(now)" in line)
     assert row.split()[-5:] == ["-0.00058", "0.1714", "0.000203", "0.9997", "1.23e+05"]
 
@@ -51,15 +56,7 @@ def test_every_number_is_in_the_table_on_a_narrow_terminal(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     params = {f"CONSTANT_NUMBER_{place}": 0.125 + place for place in range(11)}  # as many as are searched of themselves
-    space = tuple(
-        Parameter(name=name, kind="constant", low=0.0, high=1.0, is_log=False, is_whole=False, default=value)
-        for name, value in params.items()
-    )
-    trial = TrialOutcome(
-        number=0, state="complete", value=64.0, params=params, run="r", completion=1.0,
-        best_lap_seconds=None, steps=64, seconds=1.0, error="",
-    )  # fmt: skip
-    say_tuned(Outcome(folder=tmp_path, goal="laps", space=space, trials=(trial,), importances={}, is_interrupted=False))
+    say_one_trial(params, 64.0, tmp_path)
     row = next(line for line in capsys.readouterr().out.splitlines() if "64 steps" in line)
     assert row.split()[-11:] == [f"{value:.4g}" for value in params.values()]
 
