@@ -24,6 +24,21 @@ class Constant:
         return np.tile(self.command, (len(sight), 1))
 
 
+class Tiring(Autopilot):
+    """Drives slower with every step that it has driven."""
+
+    def __init__(self):
+        super().__init__()
+        object.__setattr__(self, "steps", 0)
+
+    def __call__(self, state, cars=None):
+        object.__setattr__(self, "steps", self.steps + 1)
+        return super().__call__(state) * np.float32([1.0, 1.0 - 0.001 * self.steps])
+
+    def forget(self):
+        object.__setattr__(self, "steps", 0)
+
+
 def drive(driver, track=OVAL, *, num_trials=1, seed=0, **rules):
     rules = RaceRules(**rules)
     return evaluate(driver, track, rules=rules, num_trials=num_trials, seed=seed, sees="state", vehicle=EVEN)
@@ -228,6 +243,16 @@ def test_a_seed_repeats_an_evaluation_whatever_the_number_of_trials():
         np.testing.assert_array_equal(mine, among_seven)
     np.testing.assert_array_equal(tables(three)[0], tables(other)[0])  # trial 0 starts exactly, whatever the seed
     assert tables(three)[1][0, 2:4].tolist() != tables(other)[1][0, 2:4].tolist()
+
+
+def test_a_driver_that_remembers_begins_every_evaluation_anew():
+    driver = Tiring()
+    times = [drive(driver, laps=1).trials[0].lap_times for _ in range(3)]
+    assert times == [times[0]] * 3
+    assert times[0] > drive(Autopilot(), laps=1).trials[0].lap_times  # it does tire
+    simulation = trial_simulation(OVAL, num_trials=1, camera=None)
+    laps = [completion(driver, simulation, sees="state").best_lap for _ in range(2)]
+    assert laps[0] == laps[1]
 
 
 def test_starts_differ_by_no_more_than_the_jitter():

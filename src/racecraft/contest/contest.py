@@ -20,7 +20,7 @@ from racecraft.contest.terms import RaceTerms, check_kind
 from racecraft.errors import ConfigError, NonFiniteAction
 from racecraft.race.conditions import Conditions
 from racecraft.race.entry import Entry
-from racecraft.race.evaluation import Driver, evaluate, race_simulation
+from racecraft.race.evaluation import Driver, begin_anew, evaluate, race_simulation
 from racecraft.race.marshal import Marshal
 from racecraft.race.provenance import provenance
 from racecraft.race.results import Trial
@@ -199,6 +199,8 @@ def race_together(drivers: Sequence[Driver], conditions: Conditions, *, num_thre
     }
     followers = [one for one in eyes.values() if one is not simulation]
     marshal = Marshal(simulation, conditions.rules, seed=conditions.seed, followers=followers)
+    for driver in drivers:
+        begin_anew(driver)
     actions = np.zeros((len(drivers), 2), dtype=np.float32)
     lost: set[int] = set()
     while marshal.is_racing:

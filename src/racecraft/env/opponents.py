@@ -15,7 +15,8 @@ from racecraft.sim import Simulation
 Driver = Callable[[NDArray[Any]], NDArray[np.float32]]
 """From what N cars see to commands (N, 2), steering angle in rad and speed in m/s. It sees the frames of the front
 camera, uint8 (N, 120, 160); or, where it has an attribute ``sensors``, what this `SensorSuite` reads; or, where its
-attribute ``sees`` is ``"state"``, the privileged state, float32 (N, S)."""
+attribute ``sees`` is ``"state"``, the privileged state, float32 (N, S). One that remembers has a method ``forget``,
+which is called when its car begins an episode; it is told the numbers of the cars that it sees for, too, intp (N,)."""
 
 MAX_OPPONENTS = 7
 
@@ -68,6 +69,13 @@ class Opponents:
         sensors: SensorSuite = getattr(driver, "sensors", FRONT_CAMERA)
         return sensors.read(self._simulation)
 
+    def begin(self, cars: NDArray[np.bool_]) -> None:
+        """Let the drivers of these cars, which begin an episode, forget what was before it  (K,)."""
+        for car, driver in enumerate(self._drivers, start=1):
+            memory = _memory_of(driver)
+            if cars[car] and memory is not None:
+                memory.forget()
+
     def commands(self, own: NDArray[np.float32]) -> NDArray[np.float32]:
         """Commands of all cars (K, 2), those of the learner's (1, 2) first.
 
@@ -77,8 +85,15 @@ class Opponents:
         everyone = np.empty((1 + len(self._drivers), 2), dtype=np.float32)
         everyone[0] = own[0]
         for car, driver in enumerate(self._drivers, start=1):
-            command = np.asarray(driver(self._sight(driver)[car : car + 1]))
+            seen = self._sight(driver)[car : car + 1]
+            memory = _memory_of(driver)
+            command = np.asarray(driver(seen) if memory is None else memory(seen, np.array([car])))
             if command.shape != (1, 2):
                 raise ShapeError(f"Opponent {car} gave commands of shape {command.shape}, expected (1, 2).")
             everyone[car] = command[0]
         return everyone
+
+
+def _memory_of(driver: Any) -> Any:
+    """The driver itself where it remembers, else None."""
+    return driver if callable(getattr(driver, "forget", None)) else None

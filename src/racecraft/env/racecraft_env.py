@@ -208,6 +208,8 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
             key = int(self.np_random.integers(2**63))
         seeds = None if key is None else np.full(len(self._everyone), key, dtype=np.uint64)
         self._task.reset(self._everyone, seeds=seeds)
+        if self._opponents is not None:
+            self._opponents.begin(self._everyone)
         self._has_key = self._is_running = True
         return self._task.observer.one(0), single_info(self._task.simulation.rows[0])
 
@@ -224,8 +226,10 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
         if self._opponents is None:
             reward = float(task.step(np.asarray(action)[None])[0])
         else:
+            over = task.done
             commands = self._opponents.commands(task.action_space.to_commands(np.asarray(action)[None]))
-            reward = float(task.drive(commands, reset=task.done, paid=self._learns)[0])
+            reward = float(task.drive(commands, reset=over, paid=self._learns)[0])
+            self._opponents.begin(over)
         terminated, truncated = bool(task.simulation.terminated[0]), bool(task.simulation.truncated[0])
         self._is_running = not (terminated or truncated)
         info = single_info(task.simulation.rows[0])

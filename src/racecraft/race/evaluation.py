@@ -54,6 +54,12 @@ class RememberingDriver(Protocol):
         """Begin anew with every car."""
 
 
+def begin_anew(driver: Driver) -> None:
+    """Let a driver that remembers forget whatever it drove before: equal starts are to mean equal commands."""
+    if isinstance(driver, RememberingDriver):
+        driver.forget()
+
+
 def evaluate(
     policy: Driver,
     track: Track,
@@ -110,6 +116,7 @@ def evaluate(
     has_lidar = bool(sensors.lidar_name) and sees == "frames"
     simulation = race_simulation(conditions, num_cars=num_trials, has_lidar=has_lidar, num_threads=num_threads)
     marshal = Marshal(simulation, rules, seed=seed)
+    begin_anew(policy)
     while marshal.is_racing:
         marshal.step(_checked(policy(_sight(simulation, sees, sensors)), num_trials))
     return Evaluation(conditions=conditions, trials=marshal.trials())
@@ -245,6 +252,7 @@ def completion(
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
     line_up(simulation, rules, seed=seed, is_anew=True)
+    begin_anew(policy)
     return drive_lap(policy, simulation, sees=sees, sensors=sensors, max_seconds=max_seconds, on_row=on_row)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.checks import check_choice, check_whole
 from racecraft.errors import ConfigError
-from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, drive_lap
+from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, begin_anew, drive_lap
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.race.statistics import Interval, wilson_interval
@@ -219,8 +219,7 @@ def _awake(policy: Driver, simulation: Simulation) -> Driver:
     commands = np.zeros((simulation.num_envs, 2), dtype=np.float32)
 
     remembering = policy if isinstance(policy, RememberingDriver) else None
-    if remembering is not None:
-        remembering.forget()
+    begin_anew(policy)
 
     def drive(sight: NDArray[Any]) -> NDArray[np.float32]:
         awake = np.flatnonzero(~(simulation.terminated | simulation.truncated))
