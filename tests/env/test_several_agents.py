@@ -172,6 +172,28 @@ def test_a_picture_shows_the_race():
 # --- one car against others
 
 
+@pytest.mark.parametrize("track", ["oval", "straight"])
+def test_a_picture_is_of_the_foremost_wherever_it_began(track):
+    env = RacecraftParallelEnv(
+        track=track,
+        num_cars=3,
+        observation="state",
+        action_space="continuous",
+        render_mode="rgb_array",
+        start=Start(mode="fixed"),
+    )
+    env.reset(seed=1)
+    frame = env._renderer.frame
+    assert np.array_equal(env.render(), frame(0))  # in front on the grid
+    for _ in range(8):  # those behind are faster, and still behind
+        env.step({"car_0": np.float32([0.0, -1.0]), "car_1": np.float32([0.0, -0.8]), "car_2": np.float32([0.0, -0.8])})
+    progress = env._task.simulation.column("progress")
+    assert (progress[0] < progress[1]) == (track == "oval")  # on a circuit everybody's lap begins in the grid
+    assert np.array_equal(env.render(), frame(0))
+    assert not np.array_equal(env.render(), frame(1))
+    env.close()
+
+
 def test_one_car_against_frozen_opponents_is_a_gymnasium_environment():
     env = gymnasium.make("racecraft.env:Racecraft-v0", opponents=[drive_straight, Autopilot()], **SHORT)
     check_env(env.unwrapped, skip_render_check=True)
@@ -208,6 +230,32 @@ def test_opponents_come_back_and_the_car_runs_into_one_that_stands():
         statuses.add(info["status"])
     assert "crashed" in statuses
     assert "in_progress" in statuses or "off_track" in statuses  # where it started in front
+    env.close()
+
+
+def test_an_opponent_that_remembers_begins_every_episode_anew():
+    class Tires:
+        sees = "state"
+        steps = 0
+
+        def __call__(self, state, cars):
+            assert cars.tolist() == [1]
+            self.steps += 1
+            return np.float32([[0.5, 1.0 + 0.01 * self.steps]])
+
+        def forget(self):
+            self.steps = 0
+
+    env = RacecraftEnv(track="oval", observation="state", start=Start(mode="fixed"), opponents=[Tires()])
+
+    def drive(seed):
+        env.reset(seed=seed)
+        return np.array([np.append(env.step(4)[0], env._task.simulation.vehicles[:, 1]) for _ in range(25)])
+
+    assert (drive(1) == drive(1)).all()
+    simulation = env._task.simulation
+    assert simulation.column("episode")[1] > 0  # the opponent has left the road and come back
+    assert env._opponents._drivers[0].steps == simulation.column("steps")[1] - 1
     env.close()
 
 

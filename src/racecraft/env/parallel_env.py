@@ -16,6 +16,7 @@ from racecraft.env.rendering import Renderer, check_render_mode
 from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.extras import needed_for
+from racecraft.sim.columns import STATUS_NAMES
 from racecraft.track import Track
 
 with needed_for("The environment of several learning cars"):
@@ -154,13 +155,24 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
         if self._renderer is None:
             return None
         racing = [self._cars[agent] for agent in self.agents] or [0]
-        progress = self._task.simulation.column("lap") + self._task.simulation.column("progress")
-        return self._renderer.frame(max(racing, key=lambda car: progress[car]))
+        places = self._places()
+        return self._renderer.frame(max(racing, key=lambda car: places[car]))
 
     def close(self) -> None:
         """End the reward's process; calling again does nothing."""
         self.agents = []
         self._task.close()
+
+    def _places(self) -> NDArray[np.float64]:
+        """Laps that every car is ahead of where car 0 began: each counts its own from its place in the grid."""
+        simulation = self._task.simulation
+        length, distance = simulation.column("track_length"), simulation.column("projection_distance")
+        began = distance / length - simulation.column("progress")
+        began -= began[0]
+        if simulation.tracks[0].is_closed:
+            began -= np.round(began)
+        has_lap = simulation.column("status") == STATUS_NAMES.index("lap_complete")  # counted already
+        return began + simulation.column("lap") + np.where(has_lap, 0.0, simulation.column("progress"))
 
     def _observe(self, agents: list[str]) -> dict[str, Observation]:
         return {agent: self._task.observer.one(self._cars[agent]) for agent in agents}
