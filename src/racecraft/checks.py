@@ -75,6 +75,13 @@ def check_type(name: str, value: Any, allowed: type | tuple[type, ...], advice: 
         raise ConfigError(f"{name} is {shown(value)}; {advice}.")
 
 
+def make_plain(settings: Any) -> None:
+    """Turn NumPy's numbers among a frozen dataclass's fields into Python's, the only ones that JSON can keep."""
+    for name, value in vars(settings).items():
+        if isinstance(value, np.generic):
+            object.__setattr__(settings, name, value.item())
+
+
 def shown(value: Any) -> str:
     """A value for a message, cut where it is long."""
     text = repr(value)

@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 from racecraft.race import Autopilot, RaceRules, Recording, completion, evaluate, trial_simulation
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.placement import line_up, reset_pose, start_pose
+from racecraft.replay.header import header_of
 from racecraft.sim import ROW_COLUMNS, STATE_COLUMNS, Vehicle
 from racecraft.sim.columns import STATUS_NAMES
 from racecraft.track import Track, load_track
@@ -243,6 +246,13 @@ def test_a_seed_repeats_an_evaluation_whatever_the_number_of_trials():
         np.testing.assert_array_equal(mine, among_seven)
     np.testing.assert_array_equal(tables(three)[0], tables(other)[0])  # trial 0 starts exactly, whatever the seed
     assert tables(three)[1][0, 2:4].tolist() != tables(other)[1][0, 2:4].tolist()
+
+
+def test_a_seed_of_numpys_is_told_as_json_knows_it():
+    evaluation = drive(Autopilot(), laps=1, seed=np.int64(3))
+    assert json.loads(json.dumps(evaluation.summary()))["seed"] == 3
+    assert json.loads(json.dumps(header_of(evaluation.conditions)))["seed"] == 3
+    assert evaluation.summary() == drive(Autopilot(), laps=1, seed=3).summary()
 
 
 def test_a_driver_that_remembers_begins_every_evaluation_anew():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError, NonFiniteAction, RacecraftError, ShapeError
-from racecraft.sim import CameraSpec, Simulation, Start, Vehicle
+from racecraft.sim import Bots, CameraSpec, Obstacles, Simulation, Start, Vehicle
 from racecraft.track import Track, load_track
 
 OVAL = load_track("oval")
@@ -48,6 +50,21 @@ def test_settings(name, bad):
         assert name in message.lower()
         assert "\n" not in message
         assert repr(value) in message or name == "vehicle"
+
+
+def test_numbers_of_numpy_are_kept_as_those_that_json_knows():
+    settings = [
+        Vehicle(mass=np.float32(7.25), yaw_inertia=np.float64(0.2)),
+        CameraSpec(width=np.int64(80), pitch=np.float32(0.25)),
+        Obstacles(count=np.int16(3), min_distance=np.float32(1.5)),
+        Bots(count=np.uint8(2), speed=np.float32(0.5), positions=((np.float32(0.5), np.int64(1)),)),
+    ]
+    for one in settings:
+        assert type(one)(**json.loads(json.dumps(asdict(one)))) == one
+    numbers = {"num_envs": np.int64(4), "cars_per_race": np.int8(2), "seed": np.uint64(2**64 - 1)}
+    simulation = Simulation(OVAL, **numbers, camera=None)
+    told = (simulation.num_envs, simulation.cars_per_race, simulation.seed)
+    assert json.loads(json.dumps(told)) == [4, 2, 2**64 - 1]
 
 
 def test_an_open_track_has_one_lap():

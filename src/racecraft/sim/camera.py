@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
-from racecraft.checks import check_choice, check_number, check_whole
+from racecraft.checks import check_choice, check_number, check_whole, make_plain
 
 PALETTES: Final = ("2018", "2020", "2026")
 LUMA: Final = (0.2989, 0.587, 0.114)
@@ -54,6 +54,7 @@ class CameraSpec:
         for name, (low, high) in limits.items():
             check_number(f"Camera setting {name}", getattr(self, name), low, high)
         check_choice("Camera palette", self.palette, PALETTES)
+        make_plain(self)
 
     @property
     def left_lens(self) -> CameraSpec:

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Final
 
 from racecraft import _native
-from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, make_plain, require
 from racecraft.errors import ConfigError, did_you_mean
 
 MAX_OBJECTS: Final = 32
@@ -73,6 +73,7 @@ class Obstacles:
         stored = _check_group("Obstacles", self.count, self.placement, self.positions, self.min_distance)
         object.__setattr__(self, "positions", stored)
         check_choice("Obstacles kind", self.kind, OBSTACLE_KINDS)
+        make_plain(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +107,7 @@ class Bots:
         check_number("Bots shortest_stay", self.shortest_stay, 0.1, 3600.0)
         check_number("Bots longest_stay", self.longest_stay, self.shortest_stay, 3600.0)
         check_number("Bots change_distance", self.change_distance, 0.1, 100.0)
+        make_plain(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -185,17 +185,17 @@ class Simulation:
         check_whole("cars_per_race", cars_per_race, 1, _native.MAX_CARS_PER_RACE)
         require("num_envs", num_envs, num_envs % cars_per_race == 0, f"a multiple of cars_per_race, {cars_per_race}")
 
-        self.num_envs = num_envs
-        self.seed = seed
+        self.num_envs = int(num_envs)
+        self.seed = int(seed)
         self.vehicle = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle)
         self.camera = camera
         self.randomize = randomize if isinstance(randomize, Randomization) else load_randomization(randomize)
         self.randomize.check(self.vehicle, camera)
         self.start = start
         self.direction = direction
-        self.laps = laps
+        self.laps = int(laps)
         self.objects = objects
-        self.cars_per_race = cars_per_race
+        self.cars_per_race = int(cars_per_race)
         self.num_objects = objects.count + cars_per_race - 1
         self._everyone = np.ones(num_envs, dtype=np.bool_)
         self._engine = _native.Engine(

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Final
 
-from racecraft.checks import check_number
+from racecraft.checks import check_number, make_plain
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.parameter_file import read_parameters
 
@@ -61,6 +61,7 @@ class Vehicle:
     def __post_init__(self) -> None:
         for field in fields(self):
             check_number(f"Vehicle parameter {field.name}", getattr(self, field.name), *LIMITS[field.name])
+        make_plain(self)
         axle = max(self.front_axle, self.rear_axle)
         least = MIN_INERTIA_RATIO * self.mass * (axle**2 + self.half_track**2 + LEAST_REACH**2)
         if self.yaw_inertia < least:
