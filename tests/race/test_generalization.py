@@ -118,6 +118,15 @@ def test_a_blind_policy_masters_nothing():
     assert found.mastered == ()
 
 
+def test_what_is_named_twice_counts_once(table):
+    twice = generalize(
+        LineFollower(), [*TRACKS[:1], *TRACKS[:1]], camera=SMALL, directions=["reverse", "reverse"], num_threads=1
+    )
+    once = generalize(LineFollower(), TRACKS[:1], camera=SMALL, directions="reverse", seed=np.int64(0), num_threads=1)
+    assert twice == once
+    assert once.results[0].completions == table.results[1].completions[:1]
+
+
 def test_the_sums():
     row = TrackResult(track="a", direction="forward", length=10.0, completions=(1.0, 0.5), lap_times=(9.0,))
     other = replace(row, direction="reverse", completions=(1.0, 1.0), lap_times=(8.0, 10.0))
@@ -133,7 +142,11 @@ def test_the_sums():
 
 
 @pytest.mark.parametrize(
-    "settings", [{"tracks": []}, {"directions": []}, {"directions": ["up"]}, {"num_trials": 0}, {"num_trials": 101}]
+    "settings",
+    [
+        *({"tracks": []}, {"directions": []}, {"directions": ["up"]}, {"num_trials": 0}, {"num_trials": 101}),
+        *({"seed": seed} for seed in (-1, 2**64, 1.5, None, "1")),
+    ],
 )
 def test_mistakes(settings):
     with pytest.raises(ConfigError):

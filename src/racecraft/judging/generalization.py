@@ -52,7 +52,8 @@ def generalize_run(
 
     Args:
         run: The run folder.
-        tracks: ``all``, ``library``, ``generated:0..99``, a folder or tracks; see `racecraft.track.load_tracks`.
+        tracks: ``all``, ``library``, ``generated:0..99``, a folder or tracks; see `racecraft.track.load_tracks`; one
+            that is named twice is driven once.
         directions: ``forward``, ``reverse`` or both.
         num_trials: Laps to try on each track in each direction.
         checkpoint: ``best``, ``last`` or a number of steps.
@@ -86,7 +87,7 @@ def generalize_run(
     )
     try:
         path = folder.new_evaluation()[1] / "generalization.json"
-        write_json(path, {"step": step, "seed": seed, **found.to_dict()})
+        write_json(path, {"step": step, "seed": int(seed), **found.to_dict()})
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
     return RunGeneralization(run=folder.path, step=step, generalization=found, path=path)

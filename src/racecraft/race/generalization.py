@@ -142,7 +142,7 @@ def generalize(
     Args:
         policy: What drives: called with what the sensors of the cars that still do tell, frames uint8 (N, 120, 160) of
             the front camera alone.
-        tracks: Where.
+        tracks: Where; one that is named twice is driven once.
         directions: ``forward``, ``reverse`` or both.
         num_trials: Laps to try on each track in each direction, 1 to 100; the first starts exactly on the line.
         seed: Of the starts and of the randomisation.
@@ -156,10 +156,16 @@ def generalize(
         ConfigError: No track, a direction that does not exist, or a setting outside its range.
     """
     check_whole("num_trials", num_trials, 1, MAX_TRIALS, is_plain=True)
+    check_whole("seed", seed, 0, 2**64 - 1)
+    if isinstance(directions, str):
+        directions = [directions]
     for direction in directions:
         check_choice("direction", direction, DIRECTIONS)
     if not tracks or not directions:
         raise ConfigError("There is no track or no direction to drive.")
+    # The same road twice would be the same laps twice, which tell no more and would count as more.
+    tracks = list({(track.name, track.digest): track for track in tracks}.values())
+    directions = list(dict.fromkeys(directions))
     by_length = sorted(range(len(tracks)), key=lambda index: tracks[index].length)  # cars of a group end together
     results: dict[tuple[int, str], TrackResult] = {}
     for begin in range(0, len(by_length), GROUP):
