@@ -117,7 +117,7 @@ def test_discrete_refuses_a_bad_table(table, error):
         DiscreteActionSpace(table)
 
 
-@pytest.mark.parametrize("actions", [[10], [-1], [0.5], [[1]], ["a"], 3])
+@pytest.mark.parametrize("actions", [[10], [-1], [0.5], [[1]], ["a"], 3, [1, [2]], [1j], None, {}])
 def test_discrete_refuses_bad_actions(actions):
     with pytest.raises((ConfigError, ShapeError)):
         action_space("default").to_commands(actions)

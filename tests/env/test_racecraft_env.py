@@ -240,6 +240,13 @@ def test_a_bad_seed_is_refused(seed):
         ("default", None, ShapeError),
         ("continuous", [np.nan, 0.0], NonFiniteAction),
         ("continuous", [0.0], ShapeError),
+        ("default", [0, [1]], ShapeError),
+        ("continuous", [0.0, [1.0]], ShapeError),
+        ("continuous", "left", ShapeError),
+        ("continuous", [0.0, "left"], ShapeError),
+        ("continuous", {"steering": 1.0}, ShapeError),
+        ("continuous", [1j, 0.0], ShapeError),
+        ("continuous", [10**400, 0.0], ShapeError),
     ],
 )
 def test_a_bad_action_is_refused_and_nothing_moves(action_space, action, error):

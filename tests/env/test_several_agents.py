@@ -155,6 +155,21 @@ def test_mistakes_of_a_caller_are_said():
         env.step({"car_0": 0})
     with pytest.raises(ConfigError, match="seed"):
         env.reset(seed=-1)
+    with pytest.raises(ShapeError, match=r"different shapes, \{'car_0': \(\), 'car_1': \(1,\)\}"):
+        env.step({"car_0": 0, "car_1": [0]})
+    with pytest.raises(ShapeError, match="not an array of numbers"):
+        env.step({"car_0": 0, "car_1": [0, [1]]})
+    env.close()
+
+
+def test_what_a_car_is_told_that_has_left_the_race_means_nothing():
+    env = RacecraftParallelEnv(track="oval", observation="state", action_space="continuous")
+    env.reset(seed=1)
+    while len(env.agents) > 1:
+        env.step({agent: np.float32([agent == "car_1", -1.0]) for agent in env.agents})
+    assert env.agents == ["car_0"]
+    for nonsense in (np.float32([np.nan, 0.0]), None, "left"):
+        assert env.step({"car_1": nonsense, "car_0": np.float32([0.0, -1.0])})[1].keys() == {"car_0"}
     env.close()
 
 

@@ -131,6 +131,7 @@ def test_the_ends_of_every_range_work():
     [
         np.zeros((3, 3)), np.zeros((2, 2)), np.zeros((4, 2)), np.zeros(6), np.zeros((1, 3, 2)), np.zeros((0, 2)),
         0.0, [], None, "left", [["a", "b"]] * 3, [[1, 2], [3]], object(), {"steering": 1},
+        np.full((3, 2), 1j), [[10**400, 1]] * 3,
     ],
 )  # fmt: skip
 def test_actions_of_another_shape_or_kind(simulation, actions):
@@ -220,9 +221,11 @@ def test_penalties(simulation):
             simulation.freeze(0, steps)
 
 
-@pytest.mark.parametrize("saved", [b"", "state", None, np.zeros(10), object()])
+@pytest.mark.parametrize(
+    "saved", [b"", "state", None, np.zeros(10), np.zeros(9, np.uint8), np.zeros((2, 9), np.uint8), [1, 300], object()]
+)
 def test_saved_states(simulation, saved):
-    with pytest.raises(ShapeError):
+    with pytest.raises(ShapeError, match=r"^Saved simulation state"):
         simulation.load(saved)
 
 

@@ -104,7 +104,7 @@ class DiscreteActionSpace:
 
     def to_commands(self, actions: ArrayLike) -> NDArray[np.float32]:
         """Commands for ``Simulation.step``   (N, 2) from action indices   (N,)."""
-        indices = np.asarray(actions)
+        indices = _array(actions)
         if indices.ndim != 1 or indices.dtype.kind not in "iu":
             raise ShapeError(
                 f"actions have shape {indices.shape} and type {indices.dtype}, "
@@ -214,7 +214,7 @@ class ContinuousActionSpace:
 
     def to_commands(self, actions: ArrayLike) -> NDArray[np.float32]:
         """Commands for ``Simulation.step``   (N, 2) from actions   (N, 2); what is beyond ±1 counts as ±1."""
-        values = np.asarray(actions, dtype=np.float64)
+        values = _array(actions, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != 2:
             raise ShapeError(
                 f"actions have shape {values.shape}, expected (N, 2): steering_angle and speed in [-1, 1]."
@@ -291,6 +291,16 @@ def _frozen(values: ArrayLike, *, name: str) -> NDArray[np.float64]:
         raise ConfigError(f"{name} holds NaN or infinity; allowed are finite steering angles and speeds.")
     array.setflags(write=False)
     return array
+
+
+def _array(actions: ArrayLike, *, dtype: type | None = None) -> NDArray[Any]:
+    try:
+        array = np.asarray(actions)
+        if array.dtype.kind == "c":
+            raise TypeError("they are complex")  # NumPy would leave a part of them out
+        return array if dtype is None else array.astype(dtype, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ShapeError(f"actions are not an array of numbers: {error}.") from error
 
 
 def _check(name: str, value: float, low: float, high: float, unit: str) -> None:

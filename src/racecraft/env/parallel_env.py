@@ -13,8 +13,8 @@ from racecraft.checks import check_whole
 from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import DrivingTask, TaskSettings, check_names, seed_key
-from racecraft.errors import ConfigError, ResetNeeded
+from racecraft.env.task import DrivingTask, TaskSettings, check_names, of_one_car, seed_key
+from racecraft.errors import ConfigError, ResetNeeded, ShapeError
 from racecraft.extras import needed_for
 from racecraft.sim.columns import STATUS_NAMES
 from racecraft.track import Track
@@ -124,7 +124,9 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
 
         Raises:
             ResetNeeded: No race is under way.
-            ConfigError: An agent that races has no action.
+            ConfigError: An agent that races has no action, or one that does not exist.
+            ShapeError: An action has another form than the action space's.
+            NonFiniteAction: An action holds NaN.
             RewardError: The reward function failed.
         """
         if not self.agents:
@@ -133,9 +135,12 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
         if missing:
             raise ConfigError(f"actions lack {', '.join(missing)}; every agent in `agents` needs one.")
         task, racing = self._task, self.agents
-        idle = next(iter(actions.values()))  # whoever has left the race stands, whatever it is told
-        commands = np.stack([actions.get(agent, idle) for agent in self.possible_agents])
-        rewards = task.step(commands, paid=np.array([agent in racing for agent in self.possible_agents]))
+        idle = racing[0]  # whoever has left the race stands, whatever it is told
+        given = [of_one_car(actions[agent if agent in racing else idle]) for agent in self.possible_agents]
+        shapes = {agent: one.shape[1:] for agent, one in zip(self.possible_agents, given, strict=True)}
+        if len(set(shapes.values())) > 1:
+            raise ShapeError(f"The actions have different shapes, {shapes}; allowed is that of the action space.")
+        rewards = task.step(np.concatenate(given), paid=np.array([agent in racing for agent in self.possible_agents]))
         simulation = task.simulation
         laps = task.lap_times()
         results: StepResult = (self._observe(racing), {}, {}, {}, {})

@@ -14,7 +14,7 @@ from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.opponents import Driver, Opponents, check_opponents
 from racecraft.env.rendering import Renderer, check_render_mode
-from racecraft.env.task import MOST_STEPS, DrivingTask, TaskSettings, check_names, seed_key
+from racecraft.env.task import MOST_STEPS, DrivingTask, TaskSettings, check_names, of_one_car, seed_key
 from racecraft.errors import ConfigError, ResetNeeded
 from racecraft.track import Track
 
@@ -218,16 +218,19 @@ class RacecraftEnv(gymnasium.Env[Observation, Any]):
 
         Raises:
             ResetNeeded: No episode is under way.
+            ShapeError: The action has another form than the action space's.
+            ConfigError: There is no such discrete action.
+            NonFiniteAction: It holds NaN.
             RewardError: The reward function failed.
         """
         if not self._is_running:
             raise ResetNeeded("step() was called while no episode is under way; call reset() first.")
         task = self._task
         if self._opponents is None:
-            reward = float(task.step(np.asarray(action)[None])[0])
+            reward = float(task.step(of_one_car(action))[0])
         else:
             over = task.done
-            commands = self._opponents.commands(task.action_space.to_commands(np.asarray(action)[None]))
+            commands = self._opponents.commands(task.action_space.to_commands(of_one_car(action)))
             reward = float(task.drive(commands, reset=over, paid=self._learns)[0])
             self._opponents.begin(over)
         terminated, truncated = bool(task.simulation.terminated[0]), bool(task.simulation.truncated[0])

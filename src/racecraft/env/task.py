@@ -237,6 +237,18 @@ class DrivingTask:
             raise ResetNeeded("The environment is closed, and with it the reward's process; make a new one.")
 
 
+def of_one_car(action: Any) -> NDArray[Any]:
+    """The action of a single car as those of a batch of one (1, ...).
+
+    Raises:
+        ShapeError: It is no array.
+    """
+    try:
+        return np.asarray(action)[None]
+    except ValueError as error:  # lists of different lengths
+        raise ShapeError(f"action is not an array of numbers: {error}.") from error
+
+
 def seed_key(seed: Any) -> int:
     """A seed as the simulation takes it.
 

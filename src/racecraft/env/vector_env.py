@@ -127,6 +127,9 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
 
         Raises:
             ResetNeeded: A car has not begun an episode, or its episode is over and autoreset is disabled.
+            ShapeError: The actions have another form than the action space's, or are not one per car.
+            ConfigError: There is no such discrete action.
+            NonFiniteAction: They hold NaN.
             RewardError: The reward function failed.
         """
         if not self._has_key.all():

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from racecraft import _native
-from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, require, shown
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError, did_you_mean
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
@@ -324,9 +324,12 @@ class Simulation:
             NonFiniteAction: An action is NaN or infinite; nothing has moved.
         """
         try:
+            given = np.asarray(actions)
+            if given.dtype.kind == "c":
+                raise TypeError("they are complex")  # NumPy would leave a part of them out
             with np.errstate(over="ignore"):  # infinity is refused below
-                commands = np.ascontiguousarray(actions, dtype=np.float32)
-        except (TypeError, ValueError) as error:
+                commands = np.ascontiguousarray(given, dtype=np.float32)
+        except (TypeError, ValueError, OverflowError) as error:
             raise ShapeError(f"actions are not an array of numbers: {error}.") from error
         if commands.shape != (self.num_envs, 2):
             raise ShapeError(
@@ -385,8 +388,10 @@ class Simulation:
         Raises:
             ShapeError: The bytes are not from a simulation of this shape and of these tracks.
         """
+        if not isinstance(saved, np.ndarray) or saved.ndim != 1 or saved.dtype != np.uint8:
+            raise ShapeError(f"Saved simulation state is {shown(saved)}; allowed are the bytes of save(), uint8 (B,).")
         try:
-            self._engine.load(unseal(np.ascontiguousarray(saved, dtype=np.uint8), self.tracks))
+            self._engine.load(unseal(np.ascontiguousarray(saved), self.tracks))
         except (TypeError, ValueError) as error:
             raise ShapeError(f"{error}") from error
 
