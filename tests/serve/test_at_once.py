@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
+from racecraft.course import lessons
+from racecraft.course.lesson import Lesson
 from racecraft.serve.comments import comments as comments_module
 from racecraft.serve.comments.comments import Comments
 from racecraft.serve.groups import groups as groups_module
 from racecraft.serve.groups.groups import Groups
+from racecraft.serve.lessons.studies import progress_of, record
 from racecraft.serve.people import keys as keys_module
 from racecraft.serve.people import people as people_module
 from racecraft.serve.people.identities import Identities
@@ -115,3 +118,15 @@ def test_who_is_shut_out_while_it_is_made_has_no_key(database: Database, monkeyp
     with pytest.raises(NotLetIn, match="not signed in"):
         identities.link(ADA, "https://school.example", "thief", asked_in=asked_in)
     assert identities.of(ADA, "https://school.example") is None
+
+
+def test_a_lesson_that_is_read_and_answered_at_the_same_moment_is_both(database: Database) -> None:
+    for lesson in lessons():  # those who come together do not always meet
+        right = [question.answer for question in lesson.facts.questions]
+
+        def ask(number: int, lesson: Lesson = lesson, right: list[int] = right) -> None:
+            record(database, ADA, lesson, is_read=number % 2 == 0, answers=right if number % 2 else None)
+
+        assert successes(ask) == AT_ONCE
+        done = progress_of(database, [ADA])[ADA][lesson.number]
+        assert (done.is_read, done.quiz) == (True, 1)

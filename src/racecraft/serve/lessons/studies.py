@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import sqlalchemy as sa
+from sqlalchemy.dialects import sqlite
+from sqlalchemy.orm import Session
 
 from racecraft.course.lesson import Lesson
 from racecraft.course.progress import read_progress
@@ -34,10 +36,9 @@ def record(
     """
     share = None if answers is None else _share(lesson, answers)
     with database.transaction() as session:
-        row = session.get(StudiedLesson, (user_id, lesson.number))
-        if row is None:
-            row = StudiedLesson(user_id=user_id, lesson=lesson.number)
-            session.add(row)
+        # whoever answers the last question at the foot of a page has read it at the same moment
+        session.execute(_begun(session, user_id, lesson.number))
+        row = session.get_one(StudiedLesson, (user_id, lesson.number), with_for_update=True)
         if is_read and row.read is None:
             row.read = now()
         if share is not None:
@@ -55,6 +56,16 @@ def with_solved(progress: LessonProgress, number: int) -> LessonProgress:
     shares = [share for share in (progress.quiz, kept.quizzes.get(number)) if share is not None]
     solved = sorted(name for name in kept.exercises if name.startswith(f"{number}."))
     return LessonProgress(is_read=progress.is_read, quiz=max(shares, default=None), solved=solved)
+
+
+def _begun(session: Session, user_id: int, lesson: int) -> sa.Insert:
+    """A row for a lesson, unless another request makes it meanwhile."""
+    row = {"user_id": user_id, "lesson": lesson}
+    if session.get_bind().dialect.name == "postgresql":
+        from sqlalchemy.dialects import postgresql  # takes its time to load, and most consoles do without
+
+        return postgresql.insert(StudiedLesson).values(**row).on_conflict_do_nothing()
+    return sqlite.insert(StudiedLesson).values(**row).on_conflict_do_nothing()
 
 
 def _share(lesson: Lesson, answers: Sequence[int]) -> float:
