@@ -6,7 +6,9 @@ import inspect
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,6 +33,31 @@ def test_type_checkers_see_the_same_names() -> None:
     source = inspect.getsource(racecraft)
     for name in NAMES:
         assert f" as {name}\n" in source or f"    {name} = " in source
+
+
+def test_a_star_brings_all_of_them() -> None:
+    brought: dict[str, object] = {}
+    exec("from racecraft import *", brought)
+    assert set(NAMES) <= set(brought)
+
+
+@pytest.mark.parametrize(
+    ("call", "others"),
+    [
+        *((racecraft.load_track, [["oval"], 5, None, b"oval"]), (racecraft.load_tracks, [5, None])),
+        (lambda what: racecraft.load_tracks([what]), [5, ["oval"], racecraft.load_track("oval")]),
+        (lambda what: racecraft.draw_track(what, "oval.png"), ["oval", None]),
+        *((racecraft.evaluate, [None, 5, ["runs/one"]]), (racecraft.generalize, [None, 5, ["runs/one"]])),
+        *((racecraft.resume, [None, 5]), (racecraft.verify, ["one.replay", None])),
+        (racecraft.read_replay, [0, None, []]),
+        *((racecraft.ModelMetadata.load, [0, {}]), (racecraft.Hyperparameters.load, [0, {}])),
+    ],
+)
+def test_what_is_no_name_or_path_is_told_in_a_sentence(call: Callable[[Any], object], others: list[Any]) -> None:
+    for other in others:
+        with pytest.raises(racecraft.RacecraftError) as error:
+            call(other)
+        assert repr(other) in str(error.value)
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -51,6 +51,8 @@ _HOME = {
 }
 """Where each public name lives below ``racecraft``, and after a colon what it is called there."""
 
+__all__ = sorted(_HOME)
+
 if TYPE_CHECKING:
     from typing import Any
 

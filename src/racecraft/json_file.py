@@ -48,6 +48,8 @@ def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
     Raises:
         ConfigError: Not readable, no regular file, or too large.
     """
+    if not isinstance(path, str | os.PathLike):  # a number would be the file that the process has open by it
+        raise ConfigError(f"{path!r:.200} is no path of a file; allowed are texts and pathlib.Path.")
     try:
         with open_regular(path) as file:
             data = file.read(max_bytes + 1)

@@ -97,6 +97,12 @@ def test_a_run_json_that_is_no_run_changes_nothing_either(honest: Path, run: Pat
     assert np.array_equal(load_entry(run).policy(frames), load_entry(honest).policy(frames))
 
 
+@pytest.mark.parametrize("num_threads", [None, -1, 1.5, "2"])
+def test_a_number_of_threads_that_is_none_is_told(honest: Path, num_threads: Any) -> None:
+    with pytest.raises(ConfigError, match="num_threads is"):
+        load_entry(honest, num_threads=num_threads)
+
+
 def test_the_command_line_names_the_same_car_as_the_library() -> None:
     import inspect
 

@@ -87,6 +87,8 @@ def test_rules_by_name_with_single_ones_changed():
     assert rules_by_name(own, {"max_resets": 1}) == RaceRules(laps=7, max_resets=1)
     with pytest.raises(ConfigError, match="'wrker'") as caught:
         rules_by_name("wrker", {})
+    with pytest.raises(ConfigError, match=r"rules is 5; use drfc, .* or racecraft\.RaceRules"):
+        rules_by_name(5, {})
     assert "worker" in caught.value.hint
 
 

@@ -18,6 +18,7 @@ from racecraft.agent.action_space import ActionSpace
 from racecraft.agent.model_metadata import ModelMetadata
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.agent.sensors import FRAME_HEIGHT, FRAME_WIDTH
+from racecraft.checks import check_whole
 from racecraft.errors import CheckpointError, NonFiniteAction
 from racecraft.learn import Learner, NetworkSpec, distributions, network_names
 from racecraft.learn.networks import weight_shapes
@@ -72,8 +73,9 @@ def load_policy(run: RunFolder, *, checkpoint: str | int = "best", num_threads: 
     Raises:
         CheckpointError: There is no such checkpoint, it is damaged, does not fit its description, or holds what is not
             its network's.
-        ConfigError: The run's action space or sensors are not allowed.
+        ConfigError: The run's action space or sensors, or the number of threads, are not allowed.
     """
+    check_whole("num_threads", num_threads, 0, 1024)
     saved = run.checkpoints.find(checkpoint)
     return saved.step, policy_of(saved, run.read_model_metadata(), num_threads=num_threads)
 

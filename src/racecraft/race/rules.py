@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Final
 
-from racecraft.checks import check_choice, check_flag, check_number, check_whole
+from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole
 from racecraft.errors import ConfigError, did_you_mean
 from racecraft.sim.simulation import CONTROL_DT
 
@@ -147,4 +147,5 @@ def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
     if isinstance(rules, str):
         check_choice("rules", rules, RULE_SETS)
         rules = RULE_SETS[rules]
+    check_type("rules", rules, RaceRules, f"use {', '.join(RULE_SETS)} or racecraft.RaceRules(...)")
     return replace(rules, **changes)

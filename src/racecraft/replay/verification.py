@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type
 from racecraft.errors import RacecraftError, ReplayError
 from racecraft.race.announcement import Announcement
 from racecraft.race.evaluation import race_simulation
@@ -155,7 +156,9 @@ def verify(replay: Replay, *, race: Announcement | str | None = None, num_thread
 
     Raises:
         ReplayError: Its track or its settings cannot be driven at all.
+        ConfigError: It is no replay.
     """
+    check_type("replay", replay, Replay, "use what read_replay(path) gives")
     return replace(_driven_again(replay, num_threads=num_threads), foul=_foul(replay, race))
 
 

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError, RunError, did_you_mean, quoted
 from racecraft.json_file import read_json_object, read_text
 from racecraft.moved import place_of
@@ -118,7 +119,9 @@ class RunFolder:
 
         Raises:
             RunError: There is none, or it holds no run.
+            ConfigError: It is no path.
         """
+        check_type("run", path, (str, Path), "use the path of a run's folder, such as 'runs/NAME'")
         if str(path).startswith(STARTER):
             path = unpack_starter(str(path).removeprefix(STARTER), "runs")
         path = place_of(path)

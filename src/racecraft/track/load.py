@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from racecraft.checks import check_type
 from racecraft.errors import TrackNotFound, did_you_mean
 from racecraft.moved import place_of
 from racecraft.track.generator import parse_generated
@@ -26,11 +27,13 @@ def load_track(name_or_path: str | Path) -> Track:
     Raises:
         TrackNotFound: Nothing has this name.
         TrackError: The file is not a track that can be driven, or an option is out of range.
+        ConfigError: It is neither a text nor a path.
 
     Example:
         >>> round(load_track("oval").length, 2)
         16.79
     """
+    check_type("track", name_or_path, (str, Path), "use a name or a file's path")
     if not isinstance(name_or_path, str):
         return read_track(place_of(name_or_path))
     name = name_or_path

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from racecraft.checks import check_type
 from racecraft.errors import TrackError
 from racecraft.track.canvas import Canvas, text_width
 from racecraft.track.corners import TrackCorner, find_corners
@@ -218,7 +219,9 @@ def draw_track(track: Track, path: str | Path, *, width_px: int = 1600) -> Path:
 
     Raises:
         TrackError: The width or the file's ending is not allowed.
+        ConfigError: It is no track.
     """
+    check_type("track", track, Track, "get one with load_track(name or path)")
     _image_path(path)
     picture = TrackPicture(track, width_px=width_px)
     picture.caption()

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
+from racecraft.checks import check_type
 from racecraft.errors import TrackError
 from racecraft.track.library import track_names
 from racecraft.track.load import GENERATED, load_track
@@ -34,9 +35,14 @@ def load_tracks(names: str | Path | Iterable[str | Path]) -> tuple[Track, ...]:
     Raises:
         TrackNotFound: Nothing has this name.
         TrackError: A file is not a track that can be driven, a folder holds none, or they are too many.
+        ConfigError: One is neither a text nor a path.
     """
     if isinstance(names, str | Path):
         names = [names]
+    check_type("tracks", names, Iterable, "use a name or a file's path, or several in a list")
+    names = list(names)
+    for name in names:
+        check_type("track", name, (str, Path), "use a name or a file's path")
     expanded = [part for name in names for part in _expand(name)]
     if not expanded:
         raise TrackError("No track is named.")
