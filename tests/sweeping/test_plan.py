@@ -60,6 +60,16 @@ def test_what_varies_makes_every_combination() -> None:
     assert [setting.name for setting in read_sweep("seeds = [1]").settings] == ["plain"]
 
 
+def test_constants_of_the_reward_vary_as_hyperparameters_do() -> None:
+    plan = read_sweep(
+        '[settings.a]\nreward = "racing"\nnumbers = { gamma = 0.9 }\n'
+        "[vary]\nBORDER_LOSS = [0.25, 0.5]\nOFF_TRACK_PENALTY = [-1.5]\nclip_coef = [0.1]"
+    )
+    assert [setting.name for setting in plan.settings] == ["a-0.25--1.5-0.1", "a-0.5--1.5-0.1"]
+    assert [find_constants(setting.plan.reward)["BORDER_LOSS"] for setting in plan.settings] == [0.25, 0.5]
+    assert all(setting.plan.settings.ppo.gamma == 0.9 for setting in plan.settings)
+
+
 FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
 
 
@@ -80,6 +90,9 @@ FIVE = ("gamma", "learning_rate", "update_epochs", "clip_coef", "gae_lambda")
         ("[settings.a]\nalgorithm = 'sac'\nactions = 'continuous'\nnumbers = { gamma = 0.9 }", "number of ppo"),
         ("settings = 3", "settings is 3"),
         ("[vary]\ncritic = 'lap'", "vary.critic"),
+        ("[vary]\ncritc = ['lap']", "has no 'critc'.Did you mean 'critic'?"),
+        ("[vary]\nBORDER_LOS = [1.0]", "has no 'BORDER_LOS'.Did you mean 'BORDER_LOSS'?"),
+        ("[vary]\nnumbers = [1.0]", "has no 'numbers'"),
         ("[vary]\ncritic = ['lap', 'lap']", "Two settings"),
         ("goal = 'points'", "goal"),
         ("[settings.a]\ntrack = 5", "track is 5; allowed is a text, or a list of them"),

@@ -13,8 +13,9 @@ until = "5 laps or 60000 steps"
 reward = "lap_time"             # words as those of `racecraft train`
 numbers = { learning_rate = 0.002 }   # hyperparameters, and constants of the reward, as `racecraft tune` knows them
 
-[vary]                          # besides, every combination of these
+[vary]                          # besides, every combination of these words and numbers
 critic = ["privileged", "camera"]
+gamma = [0.95, 0.99]
 """
 
 from __future__ import annotations
@@ -161,7 +162,6 @@ def _rows(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     common = _table(document, "all")
     named = {name: _checked(words, name) for name, words in _table(document, "settings").items()} or {"": {}}
     vary = _table(document, "vary")
-    _check_names(vary, (*WORDS, *HYPERPARAMETERS), "vary")
     for name, values in vary.items():
         if not isinstance(values, list) or not values:
             raise ConfigError(f"vary.{name} is {values!r}; allowed is a list of what it may be.")
@@ -223,10 +223,10 @@ def _check_texts(words: Mapping[str, Any]) -> None:
         require("track", track, all(map(is_text, track)) if is_list else is_text(track), "a text, or a list of them")
 
 
-def _check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+def _check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str, *, meant: tuple[str, ...] = ()) -> None:
     for name in table:
         if name not in known:
-            hint = did_you_mean(name, known) or f"There are {', '.join(known)}."
+            hint = did_you_mean(name, (*known, *meant)) or f"There are {', '.join(known)}."
             raise ConfigError(f"{where[0].upper()}{where[1:]} has no {name!r}.", hint=hint)
 
 
@@ -244,7 +244,7 @@ def _plan(words: Mapping[str, Any], resolve: Callable[[str, Any], Any], load: Ca
     numbers = words.get(NUMBERS, {})
     constants = find_constants(plan.reward)
     known = (*constants, *HYPERPARAMETERS)
-    _check_names(numbers, known, "The reward and ppo")
+    _check_names(numbers, known, "The reward and ppo", meant=WORDS)  # a misspelt word of [vary] is taken for a number
     if (learning := {name: value for name, value in numbers.items() if name not in constants}) and (
         plan.settings.algorithm != "ppo"
     ):
