@@ -26,8 +26,10 @@ def open_regular(path: str | Path) -> BinaryIO:
     """A regular file, to be read. Whoever reads a pipe waits for somebody to write, maybe for ever.
 
     Raises:
-        OSError: Not readable, or a folder, a pipe, a socket or a device.
+        OSError: Not readable, or no path, a folder, a pipe, a socket or a device.
     """
+    if not isinstance(path, str | os.PathLike):  # a number would be the file that the process has open by it
+        raise OSError(errno.EINVAL, "it is no path")
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -48,8 +50,6 @@ def read_bytes(path: str | Path, *, max_bytes: int, name: str = "") -> bytes:
     Raises:
         ConfigError: Not readable, no regular file, or too large.
     """
-    if not isinstance(path, str | os.PathLike):  # a number would be the file that the process has open by it
-        raise ConfigError(f"{path!r:.200} is no path of a file; allowed are texts and pathlib.Path.")
     try:
         with open_regular(path) as file:
             data = file.read(max_bytes + 1)
