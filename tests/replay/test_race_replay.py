@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft.errors import ReplayError
+from racecraft.errors import ConfigError, ReplayError
 from racecraft.race import Autopilot, Evaluation, RaceRules, evaluate
 from racecraft.replay import Replay, header, read_replay, verify, write_replay
 from racecraft.replay.codec import MAGIC, TYPES, VERSION, pack, pack_column, unpack, unpack_column
@@ -85,7 +85,18 @@ def test_what_was_driven_is_driven_again_to_the_bit(evaluation: Evaluation) -> N
 def test_what_was_read_cannot_be_changed_by_mistake_and_is_told_as_genuine(clean: Path) -> None:
     replay = read_replay(clean)
     assert not any(car.recording.rows.flags.writeable for car in replay.cars)
+    poses = replay.poses(0)
+    poses[:, :2] -= poses[0, :2]  # as who plots it from its start does
+    replay.actions(0)[:] = 0.0
+    assert np.array_equal(replay.poses(0)[:, :2] - replay.poses(0)[0, :2], poses[:, :2])
+    assert np.hypot(*replay.poses(0)[0, :2]) > 1.0
     assert verify(replay, num_threads=1).to_dict()["difference"] is None
+
+
+@pytest.mark.parametrize("race", [{"document": {}, "commitment": 64 * "0", "secret": ""}, 5, b"0"])
+def test_a_race_that_is_no_announcement_is_not_passed_over(clean: Path, race: Any) -> None:
+    with pytest.raises(ConfigError, match=r"race is .*; use a commitment, or Announcement\.from_dict"):
+        verify(read_replay(clean), race=race)
 
 
 def test_it_says_what_happened_and_is_small(clean: Path) -> None:

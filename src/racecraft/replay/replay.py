@@ -89,12 +89,12 @@ class Replay:
         return max(len(car.recording) for car in self.cars)
 
     def poses(self, car: int) -> NDArray[np.float64]:
-        """X [m], y [m] and heading [rad] of a car's origin at every step, 15 a second  (T, 3)."""
-        return self.cars[car].recording.poses
+        """X [m], y [m] and heading [rad] of a car's origin at every step, 15 a second, a copy  (T, 3)."""
+        return self.cars[car].recording.poses.copy()
 
     def actions(self, car: int) -> NDArray[np.float32]:
-        """Steering angle [rad] and speed [m/s] that the driver asked for  (T, 2)."""
-        return self.cars[car].recording.actions
+        """Steering angle [rad] and speed [m/s] that the driver asked for, a copy  (T, 2)."""
+        return self.cars[car].recording.actions.copy()
 
     def events(self) -> Iterator[tuple[int, int, str]]:
         """Car, step and kind of everything that happened, car by car."""

@@ -156,9 +156,11 @@ def verify(replay: Replay, *, race: Announcement | str | None = None, num_thread
 
     Raises:
         ReplayError: Its track or its settings cannot be driven at all.
-        ConfigError: It is no replay.
+        ConfigError: It is no replay, or the race is none.
     """
     check_type("replay", replay, Replay, "use what read_replay(path) gives")
+    kinds = (Announcement, str, type(None))
+    check_type("race", race, kinds, "use a commitment, or Announcement.from_dict(...) of what was published")
     return replace(_driven_again(replay, num_threads=num_threads), foul=_foul(replay, race))
 
 
