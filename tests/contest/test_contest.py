@@ -42,6 +42,25 @@ def race(models: list[Any], root: Path, **settings: Any):
     return race_models(models, root=root, **given)
 
 
+@pytest.mark.parametrize("models", ["runs/m1", Path("runs/m1"), None, {"runs/m1"}])
+def test_what_is_no_list_of_models_is_told(models: Any) -> None:
+    with pytest.raises(ConfigError, match=r"models is .*; use a list of run folders"):
+        race_models(models, track="oval")
+    with pytest.raises(ConfigError, match=r"models is .*; use a list of run folders"):
+        rate_models(models, tracks="oval")
+
+
+@pytest.mark.parametrize(
+    "settings", [*({"seed": seed} for seed in (-1, None, 1.5)), *({"num_trials": n} for n in (1.5, "2", np.int64(2)))]
+)
+def test_a_seed_or_a_number_of_trials_that_is_none_is_told(settings: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=rf"{next(iter(settings))} is .*; allowed is a whole number from"):
+        race_models(["a", "b"], track="oval", **settings)
+    if "seed" in settings:
+        with pytest.raises(ConfigError, match="seed is"):
+            rate_models(["a", "b"], tracks="oval", **settings)
+
+
 @pytest.mark.costly
 def test_a_race_writes_results_replays_and_sim_traces(models: list[Path], tmp_path: Path) -> None:
     found = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)

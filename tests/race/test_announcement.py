@@ -7,6 +7,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError
@@ -55,6 +56,22 @@ def test_secrets_are_of_32_bytes_and_never_the_same() -> None:
     drawn = {draw_secret() for _ in range(100)}
     assert len(drawn) == 100
     assert {len(secret) for secret in drawn} == {32}
+
+
+@pytest.mark.parametrize("secret", [b"", b"short", bytes(33), "0" * 32, bytearray(31)])
+def test_of_another_secret_nobody_could_read_the_announcement(secret: Any) -> None:
+    with pytest.raises(ConfigError, match="number of bytes of a secret is"):
+        announced(secret)
+    assert Announcement.from_dict(announced().to_dict()) == announced()
+
+
+def test_a_seed_is_a_whole_number_that_json_knows() -> None:
+    assert announced(None, seed=np.uint64(2**64 - 1)).to_dict() == announced(None, seed=2**64 - 1).to_dict()
+    for seed in (-1, 2**64, 1.5, None, "1"):
+        with pytest.raises(ConfigError, match="seed is"):
+            conditions(seed=seed)
+    with pytest.raises(ConfigError, match="objects is None"):
+        conditions(objects=None)
 
 
 def test_while_the_race_is_open_nothing_tells_the_starts() -> None:

@@ -89,6 +89,8 @@ def test_rules_by_name_with_single_ones_changed():
         rules_by_name("wrker", {})
     with pytest.raises(ConfigError, match=r"rules is 5; use drfc, .* or racecraft\.RaceRules"):
         rules_by_name(5, {})
+    with pytest.raises(ConfigError, match=r"There is no race rule 'lap'\. Did you mean 'laps'\?"):
+        rules_by_name("drfc", {"lap": 2})
     assert "worker" in caught.value.hint
 
 

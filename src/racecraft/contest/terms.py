@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from racecraft.checks import check_choice, require
+from racecraft.checks import check_choice, check_whole, require
 from racecraft.contest.standings import RANKINGS
 from racecraft.errors import ConfigError
 from racecraft.race.announcement import Announcement
@@ -156,6 +156,8 @@ def check_trials(kind: str, num_trials: int | None) -> int:
     """
     high = 1 if kind in TOGETHER else MAX_TRIALS
     number = min(TRIALS, high) if num_trials is None else num_trials
+    if type(number) is not int:
+        check_whole("num_trials", number, 1, high, is_plain=True)
     if not 1 <= number <= high:
         allowed = "1: all are on one road" if high == 1 else f"1 to {high}"
         raise ConfigError(f"A {kind} race has {number} trials; allowed are {allowed}.")

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from racecraft.checks import check_whole
 from racecraft.contest.ladder import Ladder, Match, check_ladder, hold_ladder
 from racecraft.race.conditions import STANDARD_CAR, Conditions
-from racecraft.race.entry import load_entries
+from racecraft.race.entry import check_models, load_entries
 from racecraft.race.results import Trial
 from racecraft.race.rules import RaceRules, race_rules
 from racecraft.sim.objects import NO_OBJECTS, Objects
@@ -59,6 +60,8 @@ def rate_models(
     Raises:
         RacecraftError: A model, a track or a setting is not usable, or OpenSkill is not installed.
     """
+    check_models(models)
+    check_whole("seed", seed, 0, 2**64 - 1)
     check_ladder(len(models), kind=kind, schedule=schedule, starts=starts, rounds=rounds)
     entries = load_entries(models, num_threads=num_threads)
     given = {name: value for name, value in (changes or {}).items() if value is not None}
@@ -80,7 +83,7 @@ def rate_models(
         schedule=schedule,
         starts=starts,
         rounds=rounds,
-        seed=seed,
+        seed=int(seed),
         progress=progress,
         watch=watch,
         num_threads=num_threads,

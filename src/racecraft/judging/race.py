@@ -23,7 +23,7 @@ from racecraft.film.video import film
 from racecraft.race.announcement import Announcement
 from racecraft.race.artifacts import write_metrics, write_simtrace
 from racecraft.race.conditions import STANDARD_CAR, Conditions
-from racecraft.race.entry import Entry, load_entries
+from racecraft.race.entry import Entry, check_models, load_entries
 from racecraft.race.results import Evaluation
 from racecraft.race.rules import RaceRules, race_rules
 from racecraft.replay.replay import SUFFIX, write_replay
@@ -106,6 +106,7 @@ def race_models(
     Raises:
         RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
     """
+    check_models(models)
     given = {"laps": laps, **(changes or {})}
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),

@@ -24,6 +24,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
+from racecraft.checks import require
 from racecraft.errors import ConfigError, RacecraftError
 from racecraft.race.conditions import Conditions
 from racecraft.race.rules import RaceRules
@@ -78,7 +79,13 @@ class Announcement:
             num_trials: Of each entry.
             secret: 32 bytes, or None for a race whose seed everybody may know.
             final: What else is announced of a race in which two meet at a time, see `racecraft.contest.finals`.
+
+        Raises:
+            ConfigError: The secret is no 32 bytes.
         """
+        if secret is not None:  # of another one nobody could read the announcement
+            size = len(secret) if isinstance(secret, bytes) else 0
+            require("The number of bytes of a secret", size, size == SECRET_BYTES, f"{SECRET_BYTES}")
         document: dict[str, Any] = {
             "form": FORM,
             "kind": kind,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from racecraft.checks import check_type, check_whole, make_plain
 from racecraft.race.rules import RaceRules
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.objects import NO_OBJECTS, Objects
@@ -37,6 +38,11 @@ class Conditions:
     """What differs from car to car."""
     cars_per_race: int = 1
     """Cars that share a road; with one, each has the road for itself."""
+
+    def __post_init__(self) -> None:
+        check_whole("seed", self.seed, 0, 2**64 - 1)
+        check_type("objects", self.objects, Objects, "use racecraft.sim.Objects(...)")
+        make_plain(self)  # the seed is kept in files
 
     @property
     def num_objects(self) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import SensorSuite
+from racecraft.checks import check_type
 from racecraft.errors import NonFiniteAction
 from racecraft.race.policy import NetworkPolicy, load_policy
 from racecraft.run.checkpoint import split_model
@@ -63,6 +64,16 @@ def load_entry(model: str | Path, *, num_threads: int = 0) -> Entry:
     step, policy = load_policy(folder, checkpoint=checkpoint or "best", num_threads=num_threads)
     name = _shown(folder.path.resolve().name) + (f"@{checkpoint}" if checkpoint else "")
     return Entry(name, folder.path, step, policy)
+
+
+def check_models(models: Any) -> None:
+    """Refuse what is no list of models, such as a single one.
+
+    Raises:
+        ConfigError: Says what to use.
+    """
+    if isinstance(models, str | Path) or not isinstance(models, Sequence):
+        check_type("models", models, (), "use a list of run folders, RUN or RUN@CHECKPOINT")
 
 
 def load_entries(models: Sequence[str | Path], *, num_threads: int = 0) -> list[Entry]:

@@ -103,12 +103,11 @@ def evaluate(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
-    check_whole("seed", seed, 0, 2**64 - 1)
     sensors = _sensors_of(policy, sensors)
     conditions = Conditions(
         track=track,
         rules=rules,
-        seed=int(seed),
+        seed=seed,
         vehicle=vehicle if isinstance(vehicle, Vehicle) else load_vehicle(vehicle),
         camera=_needed(sensors.camera(camera), sees),
         objects=objects,

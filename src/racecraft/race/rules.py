@@ -98,10 +98,7 @@ class RaceRules:
         Raises:
             ConfigError: There is no such rule, or a value is outside its range.
         """
-        known = [rule.name for rule in fields(cls)]
-        for name in document:
-            if name not in known:
-                raise ConfigError(f"There is no race rule {name!r}. {did_you_mean(name, known)}".rstrip())
+        _check_names(document)
         return cls(**document)
 
 
@@ -148,4 +145,12 @@ def rules_by_name(rules: str | RaceRules, changes: dict[str, Any]) -> RaceRules:
         check_choice("rules", rules, RULE_SETS)
         rules = RULE_SETS[rules]
     check_type("rules", rules, RaceRules, f"use {', '.join(RULE_SETS)} or racecraft.RaceRules(...)")
+    _check_names(changes)
     return replace(rules, **changes)
+
+
+def _check_names(document: Mapping[str, Any]) -> None:
+    known = [rule.name for rule in fields(RaceRules)]
+    for name in document:
+        if name not in known:
+            raise ConfigError(f"There is no race rule {name!r}. {did_you_mean(name, known)}".rstrip())
