@@ -110,3 +110,26 @@ def test_a_learner_goes_through_three_lessons(visit: Visit) -> None:
         visit.open(f"/lessons/{number}", width=390).locator("div.text").first.wait_for()
         assert visit.violations() == [], number
         assert visit.overflow() <= 0, number
+
+
+def test_who_reads_the_choices_by_keyboard_has_not_answered_yet(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
+    visit.look("light", "en")
+    page = visit.open("/lessons/5")
+    cards = page.locator("fieldset")
+    for index, question in enumerate(find_lesson(5).facts.questions):
+        choices = cards.nth(index).get_by_role("radio")
+        choices.first.focus()
+        for _ in range(question.answer + len(question.choices)):  # all of them, and on to the right one
+            page.keyboard.press("ArrowDown")
+        expect(choices.nth(question.answer)).to_be_focused()
+        expect(cards.nth(index).locator(":checked")).to_have_count(0)
+        page.keyboard.press("Space")
+        cards.nth(index).get_by_text("Right.", exact=True).wait_for()
+    count = len(find_lesson(5).facts.questions)
+    expect(page.get_by_text(f"{count} of {count} right.")).to_be_visible()
+    page.get_by_role("button", name="Answer again").focus()
+    page.keyboard.press("Enter")
+    expect(cards.first.get_by_role("radio").first).to_be_focused()
+    expect(page.locator("fieldset :checked")).to_have_count(0)
