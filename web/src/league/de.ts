@@ -105,6 +105,8 @@ export const de: Record<LeagueKey, string> = {
   admitted: "{name} kommt wieder herein.",
   rename: "Umbenennen",
   remove: "Entfernen",
+  remove_sure:
+    "{name} aus der Gruppe nehmen? Der echte Name geht verloren, und zurück führt nur ein Code; das Konto bleibt.",
   removed: "{name} ist nicht mehr in der Gruppe.",
   removed_race: "Das Rennen ist weggelegt.",
   save: "Speichern",

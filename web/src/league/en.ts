@@ -101,6 +101,8 @@ export const en = {
   admitted: "{name} is let in again.",
   rename: "Rename",
   remove: "Remove",
+  remove_sure:
+    "Take {name} out of the group? Their real name goes, and only a code brings them back; the account stays.",
   removed: "{name} is no longer in the group.",
   removed_race: "The race is put away.",
   save: "Save",

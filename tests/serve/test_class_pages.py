@@ -1,0 +1,108 @@
+"""A class's page in a real browser, without a mouse: names, cards, who is taken out, and where the keyboard goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
+from leagues import RunningLeague, ok, running_league
+
+pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
+
+
+@pytest.fixture
+def league(tmp_path: Path) -> Iterator[RunningLeague]:
+    with running_league(tmp_path / "runs") as league:
+        yield league
+
+
+@pytest.fixture
+def visit(league: RunningLeague) -> Iterator[Visit]:
+    with visiting(league.console) as visit:
+        yield visit
+        assert visit.complaints == []
+
+
+@needs_axe
+def test_a_teacher_without_a_mouse_names_a_class_and_takes_out_only_who_is_meant(
+    league: RunningLeague, visit: Visit
+) -> None:
+    from playwright.sync_api import expect
+
+    group = league.group("Class 7b")
+    page = visit.open(f"/groups/{group}", width=360, height=740)
+    main = page.locator("#main")
+    page.get_by_role("textbox", name="Make cards for a class").fill("Comet, Ada Lovelace\nTurbo, Alan Turing\n")
+    page.get_by_role("button", name="Make 2 cards").press("Enter")
+    page.get_by_role("heading", name="Login cards").wait_for()
+    expect(main).to_be_focused()
+    page.get_by_role("button", name="Done").press("Enter")
+    expect(main).to_be_focused()
+
+    page.get_by_role("button", name="Rename: Comet").press("Enter")
+    name = page.get_by_label("Nickname", exact=True).and_(page.locator("input"))
+    expect(name).to_be_focused()
+    name.press("Escape")
+    expect(page.get_by_role("button", name="Rename: Comet")).to_be_focused()
+    page.keyboard.press("Enter")
+    name.fill("Heron")
+    name.press("Enter")
+    expect(page.get_by_role("button", name="Rename: Heron")).to_be_focused()
+
+    people = page.get_by_role("region", name="People")
+    page.get_by_role("button", name="Remove: Turbo").press("Enter")
+    sure = page.get_by_role("alert").filter(has_text="Take Turbo out of the group?")
+    expect(sure.get_by_role("button", name="Cancel")).to_be_focused()
+    assert visit.violations() == []
+    assert visit.overflow() <= 0
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Remove: Turbo")).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(sure).to_be_visible()
+    assert [one["name"] for one in ok(league.owner.get(f"/api/groups/{group}"))["members"][1:]] == ["Heron", "Turbo"]
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Enter")
+    expect(people.get_by_text("Turbo")).to_have_count(0)
+    expect(main).to_be_focused()
+    used = page.get_by_role("region", name="What everybody may use").locator("tbody strong")
+    expect(used).to_have_text(["Heron"])
+
+
+def test_how_far_a_class_is_in_the_course_names_who_is_in_it_now(league: RunningLeague, visit: Visit) -> None:
+    from playwright.sync_api import expect
+
+    group = league.group("Class 7b")
+    code = league.code(group)
+    for name in ("Comet", "Turbo"):
+        ok(league.join(code, name).put("/api/lessons/1/progress", json={"is_read": True}))
+    page = visit.open(f"/groups/{group}")
+    course = page.get_by_role("region", name="How far they are in the course")
+    expect(course.locator("tbody strong")).to_have_text(["Comet", "Turbo"])
+    page.get_by_role("button", name="Rename: Comet").click()
+    page.keyboard.press("Control+A")
+    page.keyboard.type("Heron")
+    page.keyboard.press("Enter")
+    expect(course.locator("tbody strong")).to_have_text(["Heron", "Turbo"])
+    page.get_by_role("button", name="Remove: Turbo").click()
+    page.get_by_role("alert").get_by_role("button", name="Remove").click()
+    expect(course.locator("tbody strong")).to_have_text(["Heron"])
+    expect(course.get_by_role("img", name="Lesson 1: read")).to_have_count(1)
+
+
+def test_who_ends_a_race_without_a_mouse_goes_on_where_it_was(league: RunningLeague, visit: Visit) -> None:
+    from playwright.sync_api import expect
+
+    race = {"title": "Friday cup", "track": "oval", "laps": 1}
+    number = ok(league.owner.post(f"/api/groups/{league.group('Class 7b')}/races", json=race), 201)["id"]
+    page = visit.open(f"/league/{number}")
+    end, away = (page.get_by_role("button", name=name, exact=True).first for name in ("End the race", "Put away"))
+    for asked in (away, end):
+        asked.press("Enter")
+        page.get_by_role("alert").get_by_role("button", name="Cancel").press("Enter")
+        expect(asked).to_be_focused()
+    end.press("Enter")
+    page.get_by_role("alert").get_by_role("button", name="End the race").press("Enter")
+    page.get_by_text("Over", exact=True).wait_for()
+    expect(page.locator("#main")).to_be_focused()
