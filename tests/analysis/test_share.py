@@ -6,7 +6,9 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +22,11 @@ from racecraft.errors import ReplayError, RunError
 from racecraft.film.racing_line import draw_racing_line
 from racecraft.judging.evaluation import evaluate_run
 from racecraft.learn import PPOConfig
-from racecraft.replay import read_replay, verify
+from racecraft.replay import Replay, read_replay, verify
 from racecraft.replay.in_picture import CHUNK
 from racecraft.run import RunFolder
 from racecraft.run.atomic import write_json
+from racecraft.sim import Randomization
 from racecraft.training import Until
 from racecraft.training.job import Training
 from racecraft.training.settings import make_settings
@@ -98,6 +101,13 @@ def test_a_medal_is_told(run: RunFolder, stamp: str, monkeypatch: pytest.MonkeyP
         [figure for figure in figures if figure[0][:5] == "MEDAI" or figure[0] == "MEDAL"] for figures in drawn
     ] == [[], [("MEDAILLE", "Autor")]]
     assert "<dt>Medal</dt><dd>Author</dd>" in share(run, stamp)
+
+    def of_another_car(*given: Any, **settings: Any) -> Replay:
+        replay = read_replay(*given, **settings)
+        return replace(replay, conditions=replace(replay.conditions, randomize=Randomization(friction=(1.0, 1.2))))
+
+    monkeypatch.setattr("racecraft.analysis.share.read_replay", of_another_car)
+    assert "<dt>Medal</dt>" not in share(run, stamp)
 
 
 @pytest.mark.costly

@@ -98,6 +98,14 @@ def test_an_evaluation_in_a_car_of_ones_own_says_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.costly
+def test_a_car_that_randomisation_makes_another_has_no_limit_and_no_medal(tmp_path: Path) -> None:
+    run = trained(tmp_path, track="reinvent_2018")
+    assert evaluate(run, **QUICK).to_dict()["limit"] is not None
+    assert evaluate(run, **QUICK, randomize="aws").to_dict()["limit"] is not None  # another light
+    assert evaluate(run, **QUICK, randomize="light").to_dict()["limit"] is None
+
+
+@pytest.mark.costly
 def test_a_track_that_changed_since_must_be_named(tmp_path: Path) -> None:
     def save(seed: int) -> None:
         track = generate_track(seed)

@@ -10,7 +10,7 @@ import pytest
 from racecraft.errors import ConfigError
 from racecraft.race import RULE_SETS, Autopilot, evaluate, official_races, placings
 from racecraft.race.yardstick import PERCENTILES, TIMINGS, Placing, _table
-from racecraft.sim import Vehicle
+from racecraft.sim import Randomization, Vehicle
 from racecraft.track import Track, load_track
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -72,6 +72,9 @@ def test_an_evaluation_is_placed_by_what_the_race_was_ranked_by() -> None:
     assert by_timing["TOTAL_TIME"].to_dict()["month"] == "2021-11"
     own = replace(evaluation.conditions, vehicle=Vehicle(mass=1.7))  # a car that nobody had
     assert placings(replace(evaluation, conditions=own)) == []
+    for ranges, places in (({"friction": (2.0, 2.0)}, 0), ({"latency": (0.0, 1.0)}, 0), ({"light": (0.8, 1.0)}, 2)):
+        other = replace(evaluation.conditions, randomize=Randomization(**ranges))
+        assert len(placings(replace(evaluation, conditions=other))) == places
     unfinished = replace(rules, max_resets=0, time_limit=10.0)
     cut = evaluate(Autopilot(speed=1.0), track, rules=unfinished, num_trials=1, sees="state", num_threads=1)
     assert placings(cut) == []

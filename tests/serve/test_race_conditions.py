@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from running_consoles import RunningConsole
 
 from racecraft.errors import ConfigError, TrackError, TrackNotFound
+from racecraft.limits import known_limit
 from racecraft.race.recording import Recording
 from racecraft.replay import read_replay, verify
 from racecraft.serve.conditions import randomization_of, told_randomization, told_vehicle, vehicle_of
@@ -20,6 +24,7 @@ from racecraft.serve.contests.terms import terms_of
 from racecraft.serve.evaluations.schemas import EvaluateModel
 from racecraft.serve.models.schemas import NewModel
 from racecraft.serve.races.schemas import NewRace
+from racecraft.serve.submissions.league import League
 from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.randomization import PRESETS as RANDOMIZATIONS
 from racecraft.sim.randomization import Randomization
@@ -239,3 +244,21 @@ def test_selections_are_of_ones_own_names(tmp_path: Path) -> None:
     for refusal in refusals:
         with pytest.raises(TrackNotFound):
             refusal()
+
+
+def test_a_league_gives_no_medals_for_a_car_that_randomisation_makes_another() -> None:
+    track, document = load_track("reinvent_2018"), {"vehicle": asdict(Vehicle())}
+
+    def medals(randomize: Randomization) -> Any:
+        told = {**document, "randomize": asdict(randomize)}
+        race = SimpleNamespace(owner_id=1, track=track.name, rules={}, document=told)
+        session = nullcontext(SimpleNamespace(get_one=lambda *_: race))
+        database: Any = SimpleNamespace(transaction=lambda: session)
+        courses: Any = SimpleNamespace(load=lambda _: track)
+        return League(database, lambda _: courses).medals(1)
+
+    limit = known_limit(track, Vehicle())
+    assert limit is not None
+    assert medals(Randomization()) == limit.medals
+    assert medals(RANDOMIZATIONS["aws"]) == limit.medals  # another light
+    assert medals(RANDOMIZATIONS["light"]) is None

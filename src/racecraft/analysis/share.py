@@ -138,6 +138,8 @@ def _figures(replay: Replay, lap: Recording, words: dict[str, str]) -> list[tupl
 
 
 def _medal(replay: Replay, lap: Recording) -> str:
+    if replay.conditions.randomize.changes_car:  # medals are those of its parameters' car
+        return ""
     limit, times = known_limit(lap.track, replay.conditions.vehicle), list(lap.lap_times.values())
     return limit.medals.won_by(times[0]) if limit is not None and times else ""
 

@@ -65,7 +65,7 @@ class RunEvaluation:
     files: dict[str, Path]
     """What was written, by what it is."""
     limit: TrackLimit | None = None
-    """The least a lap takes with this vehicle, where that is known without computing it."""
+    """The least a lap takes with this vehicle, where that is known without computing it and the car was no other."""
     about: Mapping[str, Any] = field(default_factory=dict)
     """What else stands in ``evaluation.json``: how it was driven."""
 
@@ -222,7 +222,7 @@ def evaluate_run(
         )
     except OSError as error:
         raise RunError(f"{error.filename or folder.path} cannot be written: {error.strerror or error}.") from error
-    limit = known_limit(driven_track(where, rules), vehicle)
+    limit = None if randomize.changes_car else known_limit(driven_track(where, rules), vehicle)
     return RunEvaluation(run=folder.path, step=step, evaluation=evaluation, files=files, limit=limit, about=about)
 
 

@@ -154,10 +154,11 @@ def placings(evaluation: Evaluation) -> list[Placing]:
     """Where an evaluation would have placed in every official race on its track, most entrants first.
 
     Races ranked by the best lap take the evaluation's best lap; the others, penalties included, the mean of the laps
-    of the trials that were finished. A car that is none of the original's has no place among them.
+    of the trials that were finished. A car that is none of the original's has no place among them, nor one that
+    randomisation makes another.
     """
-    rules, found = evaluation.rules, []
-    if evaluation.conditions.vehicle not in VEHICLES.values():
+    rules, conditions, found = evaluation.rules, evaluation.conditions, []
+    if conditions.vehicle not in VEHICLES.values() or conditions.randomize.changes_car:
         return []
     for race in official_races(evaluation.track, direction=rules.direction):
         if race.timing == "BEST_LAP_TIME":

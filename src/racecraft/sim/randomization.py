@@ -110,6 +110,12 @@ class Randomization:
         """Whether nothing is changed."""
         return self == PRESETS["none"]
 
+    @property
+    def changes_car(self) -> bool:
+        """Whether the car drives otherwise than its parameters say, be it slower: not only what it sees differs."""
+        plain = PRESETS["none"]
+        return any(getattr(self, name) != getattr(plain, name) for name in OF_CAR)
+
     def of_lenses(self) -> list[str]:
         """The quantities in use that only the CPU's cameras show: those of a real lens in a real hall."""
         first, last = CONDITIONS.index("crowd"), CONDITIONS.index("noise")
@@ -192,6 +198,9 @@ LIMITS: Final[dict[str, Range]] = {
     "colour": (-0.5, 0.5),
 }
 """Allowed range of every quantity."""
+
+OF_CAR: Final = ("friction", "mass", "speed_gain", "steering_bias", "latency")
+"""Quantities of how the car drives; the others are of what it sees."""
 
 PRESETS: Final[dict[str, Randomization]] = {
     "none": Randomization(),

@@ -36,9 +36,14 @@ def told_car(race: Race) -> AskedVehicle:
     return told_vehicle(car_of(race)) if race.document else race.vehicle
 
 
+def ranges_of(race: Race) -> Randomization:
+    """What is otherwise than the models know."""
+    return Randomization(**race.document["randomize"]) if race.document else Randomization()
+
+
 def told_ranges(race: Race) -> AskedRanges:
-    """What is otherwise than the models know, as it is asked for."""
-    return told_randomization(Randomization(**race.document["randomize"])) if race.document else "none"
+    """The same as it is asked for."""
+    return told_randomization(ranges_of(race)) if race.document else "none"
 
 
 def is_withheld(race: Race) -> bool:

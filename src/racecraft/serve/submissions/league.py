@@ -22,7 +22,7 @@ from racecraft.race.announcement import Announcement
 from racecraft.serve.groups.groups import hold_group
 from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import announcement_of, hold, is_withheld, state_of
-from racecraft.serve.races.state import car_of, told_car
+from racecraft.serve.races.state import car_of, ranges_of, told_car
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Group, Job, Member, Race, Submission, now
 from racecraft.serve.submissions.board import NONE, Board
@@ -180,6 +180,8 @@ class League:
         with suppress(RacecraftError):
             track = self._courses(race.owner_id).load(race.track)
             driven = track.reversed() if race.rules.get("direction") == "reverse" else track
+            if ranges_of(race).changes_car:
+                return None
             limit = known_limit(driven, car_of(race))
             return None if limit is None else limit.medals
         return None
