@@ -209,6 +209,31 @@ def test_a_picture_is_of_the_foremost_wherever_it_began(track):
     env.close()
 
 
+@pytest.mark.parametrize("objects", [None, Objects(bots=Bots(count=2))])
+def test_a_picture_shows_all_cars_at_the_same_moment(objects, monkeypatch):
+    env = RacecraftParallelEnv(
+        track="oval",
+        num_cars=3,
+        observation="state",
+        action_space="continuous",
+        render_mode="rgb_array",
+        objects=objects,
+    )
+    env.reset(seed=1)
+    for _ in range(10):
+        env.step({agent: np.float32([0.0, 0.0]) for agent in env.agents})
+    shown = []
+    monkeypatch.setattr("racecraft.sim.views.View.draw", lambda *_, cars, **__: shown.extend(cars))
+    env._renderer.frame(1)
+    itself, *others = shown
+    vehicles = env._task.simulation.vehicles
+    assert [(car.x, car.y, car.heading) for car in (itself, *others[-2:])] == [
+        tuple(vehicles[:3, number].tolist()) for number in (1, 0, 2)
+    ]
+    assert len(others) == (2 if objects is None else 4)
+    env.close()
+
+
 def test_one_car_against_frozen_opponents_is_a_gymnasium_environment():
     env = gymnasium.make("racecraft.env:Racecraft-v0", opponents=[drive_straight, Autopilot()], **SHORT)
     check_env(env.unwrapped, skip_render_check=True)
