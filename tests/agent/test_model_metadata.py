@@ -299,6 +299,20 @@ def test_default_is_what_a_new_model_gets():
         ModelMetadata(version="9")
 
 
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"action_space": "continuous"}, r"action_space is 'continuous'; use racecraft\.action_space"),
+        ({"action_space": [[0.0, 1.0], [0.1, 1.0]]}, "action_space is"),
+        ({"sensors": "FRONT_FACING_CAMERA"}, "sensors is 'FRONT_FACING_CAMERA'; use a list"),
+    ],
+)
+def test_what_is_no_action_space_and_no_list_of_sensors_is_told(settings, words):
+    with pytest.raises(ConfigError, match=words):
+        ModelMetadata(**settings)
+    assert hash(ModelMetadata(sensors=["FRONT_FACING_CAMERA"])) == hash(ModelMetadata())
+
+
 def test_save_says_why_it_cannot(tmp_path):
     with pytest.raises(ConfigError, match="cannot be written: No such file"):
         ModelMetadata().save(tmp_path / "none" / "model_metadata.json")

@@ -128,6 +128,13 @@ def test_bits_do_not_depend_on_batch_threads_or_instruction_set(num_threads, pre
         _native.set_isa(best)
 
 
+def test_a_file_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(ConfigError, match=r"nowhere/r\.json cannot be written: No such file"):
+        PRESETS["light"].save(tmp_path / "nowhere" / "r.json")
+    PRESETS["light"].save(tmp_path / "r.json")
+    assert load_randomization(tmp_path / "r.json") == PRESETS["light"]
+
+
 def test_a_saved_simulation_goes_on_as_if_nothing_had_happened():
     saved_one, other = (Simulation(OVAL, num_envs=3, camera=SMALL, seed=1, randomize="strong") for _ in range(2))
     drive(saved_one, 20, np.float32([0.4, 2.0]))

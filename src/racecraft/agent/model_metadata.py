@@ -11,7 +11,7 @@ from racecraft.agent.action_space import ActionSpace, ContinuousActionSpace, Dis
 from racecraft.agent.metadata_words import NEURAL_NETWORKS, VERSIONS
 from racecraft.agent.sensor_suite import SensorSuite
 from racecraft.agent.sensors import LidarConfig, check_sensors
-from racecraft.checks import check_choice
+from racecraft.checks import check_choice, check_type
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object, write_json_object
 
@@ -44,7 +44,10 @@ class ModelMetadata:
     """Sentences for the user about what in the file has no effect or is read in a special way."""
 
     def __post_init__(self) -> None:
-        check_sensors(self.sensors)
+        kinds = (DiscreteActionSpace, ContinuousActionSpace)
+        check_type("action_space", self.action_space, kinds, "use racecraft.action_space(NAME), or one of your own")
+        check_type("sensors", self.sensors, (list, tuple), "use a list of AWS's sensor names")
+        object.__setattr__(self, "sensors", check_sensors(self.sensors))
         for name, value, allowed in (
             ("neural_network", self.neural_network, NEURAL_NETWORKS),
             ("training_algorithm", self.training_algorithm, ("clipped_ppo", "sac")),

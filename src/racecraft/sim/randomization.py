@@ -160,8 +160,15 @@ class Randomization:
         return [end for field in fields(self) for end in getattr(self, field.name)]
 
     def save(self, path: str | Path) -> None:
-        """Write a file that `load_randomization` reads."""
-        Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        """Write a file that `load_randomization` reads.
+
+        Raises:
+            ConfigError: It cannot be written.
+        """
+        try:
+            Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 LIMITS: Final[dict[str, Range]] = {
