@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -27,6 +28,15 @@ def test_rewards_are_those_of_the_function_called_here(track, rows):
         rewards = worker(rows)
     assert rewards.dtype == np.float64
     assert rewards.tolist() == [1.0, 1.0, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1, 0.1, 1e-3]
+
+
+def test_several_threads_may_ask_it(track, rows):
+    with running(function("return params['steps']"), track) as worker, ThreadPoolExecutor(4) as threads:
+        batches = [np.tile(rows[:1], (count, 1)) for count in range(1, 121)]
+        for number, batch in enumerate(batches):
+            batch[:, ROW_COLUMNS.index("steps")] = 2 + number
+        for number, rewards in enumerate(threads.map(worker, batches)):
+            assert rewards.tolist() == [2.0 + number] * (number + 1)
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ import mmap
 import os
 import re
 import select
+import threading
 import time
 import weakref
 from collections.abc import Sequence
@@ -186,6 +187,7 @@ class RewardWorker:
             "trace_signal": system.TRACE,
         }
         self._start_timeout_s = start_timeout_s
+        self._turn = threading.Lock()  # of several threads that ask, one after the other has the memory and the pipes
         self._is_ready = False
         try:
             with contextlib.suppress(BrokenPipeError), os.fdopen(os.dup(self._requests), "wb") as pipe:
@@ -239,6 +241,10 @@ class RewardWorker:
         Raises:
             RewardError: The function raised, returned no number, hung or crashed; the worker has ended.
         """
+        with self._turn:
+            return self._answered(rows)
+
+    def _answered(self, rows: Rows) -> npt.NDArray[np.float64]:
         self.wait()
         if self._failure:
             raise RewardError(
