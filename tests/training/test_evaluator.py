@@ -19,11 +19,12 @@ from racecraft.run import EpisodeCounter
 from racecraft.sim import Objects, Obstacles, Simulation
 from racecraft.sim.columns import OBJECT_COLUMNS, OBJECT_HEADER, ROW_COLUMNS
 from racecraft.training import EvaluationReport, Until, evaluator
-from racecraft.training.evaluator import Evaluator
+from racecraft.training.evaluator import SURE, Evaluator
 from racecraft.training.regimes import OBJECTS
 from racecraft.training.settings import TrainSettings
 
 SETTINGS = TrainSettings(track="oval", until=Until(steps=1000), evaluation_trials=2, num_threads=1)
+OF_A_TEACHER = replace(SETTINGS, algorithm="distill")
 AMONG_BOXES = replace(SETTINGS, objects=Objects(obstacles=Obstacles(count=2)))
 Judge = Callable[..., EvaluationReport]
 
@@ -102,6 +103,42 @@ def test_on_several_tracks_the_mean_of_the_laps_counts(monkeypatch: pytest.Monke
     assert not judge(12.0, 22.0).is_best  # the fastest lap, but of one road only
     assert judge(14.0, 18.0).is_best
     assert not judge(0.9, 9.0).is_best
+
+
+def test_of_many_roads_a_student_that_is_nearly_sure_is_better_the_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    judge = judge_of(judged := evaluator_for(OF_A_TEACHER, "oval", "bowtie"), monkeypatch)
+    assert judge(0.8, 0.9).is_best
+    assert not judge(0.6, 12.0).is_best  # less than that is told apart
+    assert judge(14.0, 12.0, step=100_000).is_best
+    assert judge(0.9, 15.0, step=200_000).is_best  # as sure as two laps can tell
+    assert judge(0.875, 15.0, step=300_000).is_best
+    assert not judge(0.874, 9.0, step=400_000).is_best
+    assert judged.rank == (0.937,)
+    assert judged.best_rank == (SURE,)
+    assert judged.was_good  # and whether anything better comes is as before
+    assert judged.best_score == (1.0, -13.0)
+    assert judged.has_settled
+
+
+def test_who_began_with_the_surest_and_fastest_of_many_roads_goes_on_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    judged = evaluator_for(OF_A_TEACHER, "oval", "bowtie")
+    judged.load_state({"last": None, "best_score": [0.96, -13.0], "best_lap": 9.0})
+    judge = judge_of(judged, monkeypatch)
+    assert not judge(0.9, 15.0).is_best
+    assert judge(0.98, 15.0).is_best
+    assert judged.rank == (0.99, -15.0)
+
+
+def test_on_one_road_or_among_objects_a_student_is_no_better_for_being_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes = AMONG_BOXES.objects
+    for judged in (
+        evaluator_for(OF_A_TEACHER),
+        evaluator_for(replace(OF_A_TEACHER, objects=boxes), "oval", "bowtie"),
+        evaluator_for(SETTINGS, "oval", "bowtie"),
+    ):
+        judge = judge_of(judged, monkeypatch)
+        assert judge(14.0, 12.0).is_best
+        assert not judge(0.99, 15.0).is_best
 
 
 def test_of_two_that_are_as_good_the_later_one_has_learned_longer_and_is_the_best(judge: Judge) -> None:
@@ -226,6 +263,7 @@ def test_what_a_resumed_run_is_told_goes_on_where_the_first_was(judge: Judge, ju
     state: dict[str, Any] = judged.state()
     again.load_state(state)
     assert (again.last, again.best_score, again.best_lap) == (judged.last, (1.0, -13.0), 13.0)
+    assert again.best_rank == judged.best_rank == (1.0, -13.0)
     assert again.evaluated_at == 128
     assert again.was_good
 

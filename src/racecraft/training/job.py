@@ -225,7 +225,7 @@ class Training:
             }
             if last is not None and is_judged
             else {},
-            score=evaluator.score if is_judged else None,
+            score=evaluator.rank if is_judged else None,
         )
 
     def way_on(self, error: RacecraftError) -> str:

@@ -28,7 +28,7 @@ class EvaluationReport:
     lap_times: tuple[float, ...]
     """s, of the trials that completed the lap."""
     is_best: bool
-    """No checkpoint before was better, by `Evaluator.score`."""
+    """No checkpoint before was better, by `Evaluator.rank`."""
 
     @classmethod
     def from_dict(cls, document: Mapping[str, Any]) -> EvaluationReport:
