@@ -163,3 +163,42 @@ def test_each_tab_goes_on_with_the_reward_that_was_written_in_it(tabs: list[Page
     tabs[0].reload()
     tabs[0].get_by_label("What it is paid for").select_option("own")
     tabs[0].get_by_text("return 1.0").wait_for()
+
+
+NOTHING = """for (const name of ["localStorage", "sessionStorage", "indexedDB"]) {
+  const refuse = () => { throw new DOMException("The operation is insecure.", "SecurityError"); };
+  Object.defineProperty(window, name, { get: refuse });
+}"""  # as browsers do it that are told to keep nothing of pages
+
+
+def test_a_browser_that_keeps_nothing_is_told_of_and_its_models_are_there_until_the_page_is_closed(
+    tabs: list[Page],
+) -> None:
+    from playwright.sync_api import expect
+
+    context = tabs[0].context.browser.new_context(locale="de-DE", viewport={"width": 360, "height": 740})
+    context.set_default_timeout(PATIENCE)
+    context.add_init_script(FEW_FRAMES)
+    context.add_init_script(NOTHING)
+    page = context.new_page()
+    page.goto(tabs[0].url)
+    page.get_by_role("alert").get_by_text("Dieser Browser lässt die Seite nichts behalten").wait_for()
+    page.get_by_label("Sprache").select_option("en")
+    page.get_by_role("combobox", name="Track").select_option("oval")
+    page.get_by_label("What it is paid for").select_option("centerline")
+    page.get_by_role("button", name="Train", exact=True).click()
+    page.get_by_text("It drives 5 of 5 laps").wait_for()
+    page.get_by_role("button", name="Rename: oval-centerline-1").press("Enter")
+    page.get_by_label("New name").press("Escape")
+    expect(page.get_by_role("button", name="Rename: oval-centerline-1")).to_be_focused()
+    page.keyboard.press("Enter")
+    page.get_by_label("New name").fill("heron")
+    page.get_by_label("New name").press("Enter")
+    expect(page.get_by_role("button", name="Rename: heron")).to_be_focused()
+    assert models(page) == ["heron"]
+    page.get_by_role("button", name="Delete: heron").click()
+    expect(page.locator(".model")).to_have_count(0)
+    page.get_by_role("button", name="Undo").click()
+    page.get_by_text("heron", exact=True).wait_for()
+    assert page.get_by_text("insecure").count() == 0
+    context.close()

@@ -32,6 +32,8 @@ export const de: Record<TabKey, string> = {
   download: "Herunterladen",
   drop: "Löschen",
   full: "Im Speicher dieses Browsers ist kein Platz mehr: Lade dieses Modell jetzt herunter, oder lösche ein anderes. Es ist hier, bis die Seite geschlossen wird.",
+  nothing_kept:
+    "Dieser Browser lässt die Seite nichts behalten, wie manche privaten Fenster. Modelle sind hier, bis sie geschlossen wird: Lade sie herunter. Strecken, die du zeichnest, bleiben nicht erhalten.",
   full_track:
     "Im Speicher dieses Browsers ist kein Platz mehr, darum blieb diese Strecke nicht erhalten: Lösche ein Modell, und speichere sie dann noch einmal.",
   full_lap: "Im Speicher dieses Browsers ist kein Platz mehr: Diese Runde bleibt deine beste, bis du aussteigst.",

@@ -31,6 +31,8 @@ export const en = {
   drop: "Delete",
   dropped: "{name} is deleted.",
   full: "There is no room left in this browser's storage: download this model now, or delete another one. It is here until the page is closed.",
+  nothing_kept:
+    "This browser lets the page keep nothing, as some private windows do. Models are here until it is closed, so download them; tracks that you draw are not kept.",
   full_track:
     "There is no room left in this browser's storage, so this track was not kept: delete a model, then save it again.",
   full_lap: "There is no room left in this browser's storage: this lap stays your best until you leave the car.",

@@ -53,8 +53,12 @@ export class Garage {
     try {
       await rename(model, name);
     } catch (error) {
-      if ((error as Error).name !== "ConstraintError") throw error;
-      return false; // another tab kept one under it, a moment ago
+      if ((error as Error).name === "ConstraintError") return false; // another tab kept one under it, a moment ago
+      if (!this.unkept.includes(model)) throw error;
+      this.forget(model.name);
+      this.unkept.push({ ...model, name });
+      this.show();
+      return true;
     }
     this.forget(model.name);
     await this.list();
@@ -62,14 +66,19 @@ export class Garage {
   }
 
   async drop(name: string): Promise<void> {
+    let isOther = this.stored.some((one) => one.name === name); // than it was, what is stored
+    if (isOther) await drop(name);
     this.forget(name);
-    await drop(name);
+    this.show();
     for (const model of this.unkept)
       await keep(model).then(
-        () => this.forget(model.name),
+        () => {
+          this.forget(model.name);
+          isOther = true;
+        },
         () => undefined, // there still is no room
       );
-    await this.list();
+    if (isOther) await this.list();
   }
 
   private forget(of: string): void {

@@ -75,6 +75,18 @@ export const keepLap = (lap: DrivenLap): Promise<unknown> =>
     return before;
   });
 
+/** The browser gives the page no storage at all, as some private windows do. */
+export class NothingKept extends Error {
+  constructor(cause: unknown) {
+    super("This browser keeps nothing.", { cause });
+    this.name = "NothingKept";
+  }
+}
+const REFUSALS = ["SecurityError", "InvalidStateError", "UnknownError", "TypeError", "ReferenceError"];
+const refused = (error: unknown): never => {
+  throw REFUSALS.includes((error as Error).name) ? new NothingKept(error) : error;
+};
+
 /** Hear of every change, of this tab or another one. */
 export function onChange(listener: () => void): void {
   new BroadcastChannel(BASE).onmessage = listener;
@@ -92,7 +104,7 @@ async function ask<T>(
   mode: IDBTransactionMode,
   what: (store: IDBObjectStore, answer: (request: IDBRequest) => void) => IDBRequest,
 ): Promise<T> {
-  const base = await open();
+  const base = await open().catch(refused);
   try {
     return await new Promise<T>((done, failed) => {
       const transaction = base.transaction(name, mode);
@@ -114,5 +126,5 @@ const open = (): Promise<IDBDatabase> =>
         if (!request.result.objectStoreNames.contains(name)) request.result.createObjectStore(name, { keyPath });
     };
     request.onsuccess = () => done(request.result);
-    request.onerror = () => failed(request.error ?? new Error("This browser keeps nothing."));
+    request.onerror = () => failed(request.error ?? new NothingKept(undefined));
   });

@@ -6,9 +6,11 @@ import { en, type TabKey } from "./en";
 
 const catalogues: Record<Language, Record<TabKey, string>> = { en, de };
 
-/** What went wrong, as a sentence; `full`: what is said where the browser has no room for it. */
+/** What went wrong, as a sentence; `full`: what is said where the browser has no room for it. Where it has no storage at all it says so in its
+ *  own words, which name neither the cause nor a way out. */
 export function why(error: unknown, full: TabKey = "full"): string {
   if (!(error instanceof Error)) return String(error);
+  if (error.name === "NothingKept") return l("nothing_kept");
   return error.name === "QuotaExceededError" ? l(full) : error.message;
 }
 
