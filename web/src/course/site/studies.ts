@@ -14,13 +14,13 @@ export function remembered(): Studies {
   } catch {
     return unkept;
   }
-  const studies: Studies = { ...unkept };
+  const studies: Studies = {};
   for (const [number, kept] of Object.entries(found ?? {})) {
     const { is_read, quiz } = (kept ?? {}) as Partial<LessonProgress>;
     const share = typeof quiz === "number" && quiz >= 0 && quiz <= 1 ? quiz : null;
     studies[Number(number)] = { is_read: is_read === true, quiz: share, solved: [] };
   }
-  return studies;
+  return { ...studies, ...unkept }; // which is newer
 }
 
 /** Keep a step; what was done before stays, of quizzes the best. */
@@ -30,6 +30,6 @@ export function store(number: number, step: Step, share?: number): LessonProgres
   const quiz = share === undefined ? (before?.quiz ?? null) : Math.max(share, before?.quiz ?? 0);
   const now = { is_read: Boolean(step.is_read || before?.is_read), quiz, solved: [] };
   const all = { ...studies, [number]: now };
-  if (!browser.write(STORE, JSON.stringify(all))) unkept = all;
+  unkept = browser.write(STORE, JSON.stringify(all)) ? {} : { ...unkept, [number]: now };
   return now;
 }
