@@ -89,6 +89,9 @@ def test_open_says_what_is_missing_and_guesses(tmp_path):
     assert error.value.hint == "Did you mean 'b'?"
     with pytest.raises(RunError, match=r"run.json is missing"):
         RunFolder.open(tmp_path / "empty")
+    with pytest.raises(RunError, match="There is no run") as error:
+        RunFolder.open(tmp_path / ("x" * 5000))  # which a file system does not even look up
+    assert len(str(error.value)) < 600
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 1}', '{"format": 2}', '{"format": 1, "seed": 1, "x": 2}'])

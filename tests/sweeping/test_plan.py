@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from racecraft.errors import ConfigError, RacecraftError, RewardError
-from racecraft.sweeping import make_sweep, read_sweep
-from racecraft.tuning import find_constants
+from racecraft.errors import ConfigError, RacecraftError, RewardError, RunError
+from racecraft.sweeping import Sweep, make_sweep, read_sweep
+from racecraft.tuning import Tuning, find_constants
 
 FILE = """
 seeds = "3..4"
@@ -138,3 +138,12 @@ def test_a_reward_that_is_none_is_told_with_its_setting(tmp_path: Path) -> None:
     with pytest.raises(RewardError, match=r"^Setting 'b': .*'racign'") as told:
         read_sweep("[settings.a]\n[settings.b]\nreward = 'racign'")
     assert "racing" in told.value.hint
+
+
+@pytest.mark.parametrize("name", ["none", "x" * 5000, "a\0b", ""])
+def test_a_sweep_that_there_is_not_is_told(name: str, tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="There is no sweep") as told:
+        Sweep(tmp_path, name)
+    assert len(str(told.value)) < 600
+    with pytest.raises(RunError, match="holds no tuning"):
+        Tuning(tmp_path / name)

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.learn import PPOConfig
-from racecraft.tuning import HYPERPARAMETERS, Parameter, make_space
+from racecraft.tuning import HYPERPARAMETERS, Parameter, check_limits, make_space
 
 
 def space(*searches: str, constants: dict[str, float | int] | None = None) -> dict[str, Parameter]:
@@ -60,6 +62,18 @@ def test_every_hyperparameter_that_may_be_searched_is_one_and_its_default_is_wit
 def test_what_cannot_be_searched_is_refused(search: str, match: str) -> None:
     with pytest.raises(ConfigError, match=match):
         space(search, constants={"ZERO": 0})
+
+
+@pytest.mark.parametrize("search", ["gamma", None, 5, [5], ["gamma", None]])
+def test_what_is_no_list_of_searches_is_told(search: Any) -> None:
+    with pytest.raises(ConfigError, match=r"search is .*; (use a list|write it) "):
+        make_space(search, ppo=PPOConfig(), constants={})
+
+
+@pytest.mark.parametrize("minutes", [0, -1.0, float("nan"), float("inf"), "5", None, 50_000])
+def test_minutes_that_are_none_are_told(minutes: Any) -> None:
+    with pytest.raises(ConfigError, match="minutes is"):
+        check_limits(minutes=minutes, max_trials=0, processes=1)
 
 
 def test_a_name_said_twice_is_refused() -> None:

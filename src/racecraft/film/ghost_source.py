@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError
 from racecraft.film.ghost import LIVERY, MAX_GHOSTS, Ghost, best_lap_ghost, ghost_of
 from racecraft.race.conditions import Conditions
@@ -85,6 +86,8 @@ def check_sources(
 
 
 def _check_number(sources: Sequence[str]) -> None:
+    if isinstance(sources, str) or not isinstance(sources, Sequence):
+        check_type("ghosts", sources, (), f"use a list such as [{BEST_LAP!r}]")
     if len(sources) > MAX_GHOSTS:
         raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")
 

@@ -17,6 +17,7 @@ runs/<name>/run.json                      what is needed to repeat the run
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import time
@@ -30,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from racecraft.checks import check_type
+from racecraft.checks import check_type, shown
 from racecraft.errors import ConfigError, RunError, did_you_mean, quoted
 from racecraft.json_file import read_json_object, read_text
 from racecraft.moved import place_of
@@ -125,10 +126,10 @@ class RunFolder:
         if str(path).startswith(STARTER):
             path = unpack_starter(str(path).removeprefix(STARTER), "runs")
         path = place_of(path)
-        if not path.is_dir():
+        if not os.path.isdir(path):  # False of names too long for one, too
             siblings = [run.path.name for run in list_runs(path.parent)]
             meant = path.name.partition("@")[0]  # a whole run is asked for where somebody names a checkpoint
-            raise RunError(f"There is no run {str(path)!r}.", hint=did_you_mean(meant, siblings))
+            raise RunError(f"There is no run {shown(str(path))}.", hint=did_you_mean(meant, siblings))
         if not (path / "run.json").is_file():
             raise RunError(f"{path} holds no run: run.json is missing.")
         return cls(path)

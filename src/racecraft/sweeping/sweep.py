@@ -9,6 +9,7 @@ them into its queue. Killed at any moment it goes on, and every run ends in the 
 
 from __future__ import annotations
 
+import os
 import queue
 import shutil
 import threading
@@ -21,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.checks import check_whole
+from racecraft.checks import check_type, check_whole
 from racecraft.errors import ConfigError, RacecraftError, RunError
 from racecraft.json_file import read_json_object
 from racecraft.run import RunFolder
@@ -107,9 +108,10 @@ class Sweep:
     """
 
     def __init__(self, runs: str | Path, name: str) -> None:
+        check_type("name", name, str, "use that of a sweep")
         self.runs, self.name = Path(runs), name
         self.file = self.runs / FOLDER / f"{name}.json"
-        if not self.file.is_file():
+        if not os.path.isfile(self.file):  # False of names too long for one, too
             raise RunError(f"There is no sweep {name[:80]!r} in {self.runs}.")
         try:
             document = read_json_object(self.file, max_bytes=MAX_BYTES)

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal, Self
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import PPOConfig
 
@@ -83,7 +84,11 @@ def make_space(searches: Iterable[str], *, ppo: PPOConfig, constants: dict[str, 
     Raises:
         ConfigError: A name means nothing, is said twice, or bounds are none or not for PPO.
     """
+    if isinstance(searches, str) or not isinstance(searches, Iterable):
+        check_type("search", searches, (), "use a list such as ['gamma', 'learning_rate=0.001..0.01']")
     texts = list(searches)
+    for text in texts:
+        check_type("search", text, str, "write it like 'gamma' or 'gamma=0.9..0.99'")
     if not texts:
         chosen = [name for name, value in constants.items() if value != 0][:MAX_CONSTANTS]
         texts = [*chosen, *(name for name in USUAL if name not in chosen)]

@@ -13,6 +13,7 @@ once, each at a seat; which numbers they get does not depend on that, see `racec
 
 from __future__ import annotations
 
+import os
 import queue
 import threading
 import time
@@ -22,7 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import ModelMetadata
-from racecraft.checks import check_whole, require
+from racecraft.checks import check_number, check_whole, require
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.extras import check_installed
 from racecraft.json_file import read_json_object
@@ -72,8 +73,8 @@ class Tuning:
         parents: Path | None = None,
     ) -> None:
         self.folder = Path(folder)
-        if not (self.folder / "tuning.json").is_file():
-            raise RunError(f"{self.folder} holds no tuning: tuning.json is missing.")
+        if not os.path.isfile(self.folder / "tuning.json"):  # False of names too long for one, too
+            raise RunError(f"{str(self.folder)[:200]} holds no tuning: tuning.json is missing.")
         try:
             document = read_json_object(self.folder / "tuning.json")
             if document["format"] != FORMAT:
@@ -285,6 +286,7 @@ def check_limits(*, minutes: float, max_trials: int, processes: int) -> None:
     Raises:
         ConfigError: A limit is not allowed.
     """
+    check_number("minutes", minutes, 0)
     require("minutes", minutes, 0 < minutes <= 30 * 24 * 60, "a number above 0, up to 43,200")
     check_whole("trials", max_trials, 0, 100_000)
     check_whole("processes", processes, 0, MAX_WINDOW)
