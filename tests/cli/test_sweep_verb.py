@@ -54,6 +54,9 @@ def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None
 def test_what_cannot_train_leaves_no_sweep(racecraft: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("sweep.toml").write_text(FILE)
     assert racecraft("sweep", "sweep.toml", "--processes", "-1").status == 2
+    shown = racecraft("sweep", "sweep.toml", "--board")
+    assert shown.status == 2
+    assert "--board shows a sweep that there is" in " ".join(shown.err.split())
     monkeypatch.setattr("racecraft.extras.importlib.util.find_spec", lambda _: None)
     told = racecraft("sweep", "sweep.toml", "--cluster", "auto")
     assert told.status == 1

@@ -42,6 +42,8 @@ def sweep(
         context.fail("Give the file of a new sweep, or --resume NAME.")
     if resume and name is not None:
         context.fail("--name does not go with --resume: a sweep keeps the name that it was made with.")
+    if board and not resume:
+        context.fail("--board shows a sweep that there is: name it with --resume NAME.")
     if cluster:
         check_installed("ray", "--cluster")
     from racecraft.cli import sweep_text
