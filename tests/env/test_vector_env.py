@@ -284,3 +284,16 @@ def test_a_closed_environment_says_so():
             one.reset()
     with pytest.raises(ResetNeeded, match="is closed"):
         envs.step(np.zeros(2, int))
+
+
+def test_seeds_may_be_an_array():
+    envs = RacecraftVectorEnv("oval", num_envs=3, observation="state")
+    seeds = np.random.SeedSequence(1).generate_state(3)
+    arrays, _ = envs.reset(seed=seeds)
+    lists, _ = envs.reset(seed=seeds.tolist())
+    np.testing.assert_array_equal(arrays, lists)
+    np.testing.assert_array_equal(envs.reset(seed=np.array(7))[0], envs.reset(seed=7)[0])
+    for wrong in (np.arange(2), np.array([1.0, 2.0, 3.0]), np.array([[1, 2, 3]]), np.array([-1, 0, 1])):
+        with pytest.raises(ConfigError, match="seed"):
+            envs.reset(seed=wrong)
+    envs.close()

@@ -89,7 +89,7 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
     def reset(
         self,
         *,
-        seed: int | Sequence[int | None] | None = None,
+        seed: int | Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin the next episode of all cars or of some.
@@ -105,9 +105,10 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
             ConfigError: A seed is not allowed.
             ShapeError: The mask is not bool (N,) with a car in it.
         """
+        given: int | Sequence[int | None] | None = seed.tolist() if isinstance(seed, np.ndarray) else seed
         mask = self._reset_mask(options)
-        super().reset(seed=seed_key(seed) if isinstance(seed, int | np.integer) else None)
-        own, keys = self._keys(seed)
+        super().reset(seed=seed_key(given) if isinstance(given, int | np.integer) else None)
+        own, keys = self._keys(given)
         if (mask & own).any():
             self._task.reset(mask & own)
         if (mask & ~own).any():
