@@ -150,8 +150,12 @@ def test_pipes_folders_and_missing_files(tmp_path: Path) -> None:
     folder.mkdir()
     with pytest.raises(TrackError, match=r"Cannot read track file '.*folder\.npy': Is a directory\.$"):
         load_track(folder)
-    with pytest.raises(TrackNotFound, match="nowhere"):
+    with pytest.raises(TrackNotFound, match="nowhere") as absolute:
         load_track(tmp_path / "nowhere.npy")
+    assert absolute.value.hint == ""
+    with pytest.raises(TrackNotFound, match="nowhere") as relative:
+        load_track("nowhere.npy")
+    assert "begins at the folder you are in" in relative.value.hint
     with pytest.raises(TrackError, match=r"allowed are \.npy"):
         load_track(tmp_path / "track.txt")
     with pytest.raises(TrackError):

@@ -131,7 +131,10 @@ def _read_bytes(path: Path) -> bytes:
             size = os.fstat(file.fileno()).st_size
             content = file.read(MAX_FILE_BYTES + 1) if size <= MAX_FILE_BYTES else b""
     except (FileNotFoundError, NotADirectoryError):
-        raise TrackNotFound(f"There is no track file {str(path)!r}.") from None
+        begins = "Its path begins at the folder you are in; a run keeps its track's path as given."
+        raise TrackNotFound(
+            f"There is no track file {str(path)!r}.", hint="" if path.is_absolute() else begins
+        ) from None
     except (OSError, ValueError) as error:
         raise TrackError(
             f"Cannot read track file {str(path)!r}: {getattr(error, 'strerror', None) or error}."
