@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
-from racecraft.race import Autopilot, RaceRules, Recording, completion, evaluate, trial_simulation
+from racecraft.race import Autopilot, RaceRules, Recording, completion, evaluate, generalize, trial_simulation
 from racecraft.race.default_reward import centerline_rewards
 from racecraft.race.placement import line_up, reset_pose, start_pose
 from racecraft.replay.header import header_of
@@ -246,6 +246,27 @@ def test_a_seed_repeats_an_evaluation_whatever_the_number_of_trials():
         np.testing.assert_array_equal(mine, among_seven)
     np.testing.assert_array_equal(tables(three)[0], tables(other)[0])  # trial 0 starts exactly, whatever the seed
     assert tables(three)[1][0, 2:4].tolist() != tables(other)[1][0, 2:4].tolist()
+
+
+def test_a_driver_says_itself_that_it_sees_the_state():
+    rules = RaceRules(laps=1)
+    said = evaluate(Autopilot(), OVAL, rules=rules, num_trials=1, vehicle=EVEN, num_threads=1)
+    assert said.summary() == drive(Autopilot(), laps=1).summary()
+    assert said.conditions.camera is None
+    with_a_camera = trial_simulation(OVAL, num_trials=1)
+    blind = trial_simulation(OVAL, num_trials=1, camera=None)
+    laps = {completion(Autopilot(), simulation).best_lap for simulation in (with_a_camera, blind)}
+    assert len(laps) == 1
+    (result,) = generalize(Autopilot(), [OVAL], directions="forward", num_threads=1).results
+    assert laps == set(result.lap_times)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"), [({"track": "oval"}, "track is 'oval'; get one"), ({"rules": "drfc"}, "rules is 'drfc'; use")]
+)
+def test_what_is_no_track_and_no_rules_is_told(settings, words):
+    with pytest.raises(ConfigError, match=words):
+        evaluate(Autopilot(), **{"track": OVAL, **settings})
 
 
 def test_a_seed_of_numpys_is_told_as_json_knows_it():

@@ -40,6 +40,8 @@ class Conditions:
     """Cars that share a road; with one, each has the road for itself."""
 
     def __post_init__(self) -> None:
+        check_type("track", self.track, Track, "get one with load_track(name or path)")
+        check_type("rules", self.rules, RaceRules, "use racecraft.RaceRules(...)")
         check_whole("seed", self.seed, 0, 2**64 - 1)
         check_type("objects", self.objects, Objects, "use racecraft.sim.Objects(...)")
         make_plain(self)  # the seed is kept in files

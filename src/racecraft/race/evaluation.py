@@ -70,7 +70,7 @@ def evaluate(
     vehicle: Vehicle | str = "v5",
     camera: CameraSpec = CameraSpec(),
     objects: Objects = NO_OBJECTS,
-    sees: str = "frames",
+    sees: str = "",
     sensors: SensorSuite | None = None,
     randomize: Randomization | str = "none",
     num_threads: int = 0,
@@ -92,7 +92,8 @@ def evaluate(
         vehicle: Preset name, vehicle file or `Vehicle`.
         camera: What the cars see with.
         objects: Boxes and bot cars on the track, around every car of its own; random places differ by trial.
-        sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera.
+        sees: ``frames``, or ``state`` for a policy that drives by the privileged state, without a camera; by default
+            what the policy's attribute ``sees`` says, and ``frames`` for one that has none.
         sensors: What ``frames`` are read from; by default what the policy was trained with, and the front camera for
             one that does not say.
         randomize: Preset, file or ranges of what differs between the trials.
@@ -103,7 +104,7 @@ def evaluate(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
-    sensors = _sensors_of(policy, sensors)
+    sensors, sees = _sensors_of(policy, sensors), sight_of(policy, sees)
     conditions = Conditions(
         track=track,
         rules=rules,
@@ -226,7 +227,7 @@ def completion(
     *,
     rules: RaceRules = RULE_SETS["first_lap"],
     seed: int = 0,
-    sees: str = "frames",
+    sees: str = "",
     sensors: SensorSuite | None = None,
     max_seconds: float = 0.0,
     on_row: Callable[[NDArray[np.float64]], None] | None = None,
@@ -238,7 +239,7 @@ def completion(
         simulation: From `trial_simulation`, with the same rules; it is reset first and can be used again.
         rules: Its starts are used: jitter as in `evaluate`, so equal seeds mean equal starts.
         seed: Of the starts, and of where objects stand: whatever was driven before, equal seeds mean equal places.
-        sees: ``frames`` or ``state``, as for `evaluate`.
+        sees: As for `evaluate`.
         sensors: What ``frames`` are read from, as for `evaluate`.
         max_seconds: Simulated seconds after which a slow car is stopped; 0 for none.
         on_row: Is given every judged row of the first car's lap, a view that the next step overwrites.
@@ -248,6 +249,7 @@ def completion(
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
+    sees = sight_of(policy, sees)
     _needed(simulation.camera, sees)
     if simulation.laps != 1:
         raise ConfigError(f"completion judges one lap; the simulation was made for {simulation.laps}.")
@@ -260,13 +262,13 @@ def drive_lap(
     policy: Driver,
     simulation: Simulation,
     *,
-    sees: str = "frames",
+    sees: str = "",
     sensors: SensorSuite | None = None,
     max_seconds: float | NDArray[np.float64] = 0.0,
     on_row: Callable[[NDArray[np.float64]], None] | None = None,
 ) -> Completion:
     """The same from where the cars stand; `max_seconds` may be each car's own  (N,)."""
-    sensors = _sensors_of(policy, sensors)
+    sensors, sees = _sensors_of(policy, sensors), sight_of(policy, sees)
     rewards = np.zeros(simulation.num_envs)
     is_running = np.ones(simulation.num_envs, dtype=np.bool_)
     rows = simulation.rows.copy()  # those that laps ended with
@@ -288,6 +290,11 @@ def drive_lap(
         rewards=rewards,
         statuses=tuple(STATUS_NAMES[code] for code in status),
     )
+
+
+def sight_of(policy: Any, sees: str = "") -> str:
+    """``frames`` or ``state``: what is asked for, else what the policy says that it sees."""
+    return sees or str(getattr(policy, "sees", "frames"))
 
 
 def _sensors_of(policy: Any, sensors: SensorSuite | None) -> SensorSuite:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
 from racecraft.checks import check_choice, check_whole
 from racecraft.errors import ConfigError
-from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, begin_anew, drive_lap
+from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, begin_anew, drive_lap, sight_of
 from racecraft.race.placement import start_pose
 from racecraft.race.rules import RULE_SETS
 from racecraft.race.statistics import Interval, wilson_interval
@@ -141,7 +141,7 @@ def generalize(
 
     Args:
         policy: What drives: called with what the sensors of the cars that still do tell, frames uint8 (N, 120, 160) of
-            the front camera alone.
+            the front camera alone; or with the state, where its attribute ``sees`` is ``"state"``.
         tracks: Where; one that is named twice is driven once.
         directions: ``forward``, ``reverse`` or both.
         num_trials: Laps to try on each track in each direction, 1 to 100; the first starts exactly on the line.
@@ -166,6 +166,8 @@ def generalize(
     # The same road twice would be the same laps twice, which tell no more and would count as more.
     tracks = list({(track.name, track.digest): track for track in tracks}.values())
     directions = list(dict.fromkeys(directions))
+    sees = sight_of(policy)
+    sight = {"camera": None} if sees == "state" else sensors.simulation_settings(camera)
     by_length = sorted(range(len(tracks)), key=lambda index: tracks[index].length)  # cars of a group end together
     results: dict[tuple[int, str], TrackResult] = {}
     for begin in range(0, len(by_length), GROUP):
@@ -180,12 +182,13 @@ def generalize(
             num_threads=num_threads,
             max_steps=MAX_STEPS,
             start=Start(mode="fixed"),
-            **sensors.simulation_settings(camera),
+            **sight,
         )
         for direction in directions:
             _line_up(simulation, direction, seed=seed)
             patience = np.tile([road.length / SLOWEST for road in roads], num_trials)
-            outcome = drive_lap(_awake(policy, simulation), simulation, sensors=sensors, max_seconds=patience)
+            driver = _awake(policy, simulation)
+            outcome = drive_lap(driver, simulation, sees=sees, sensors=sensors, max_seconds=patience)
             for course, index in enumerate(group):
                 times = outcome.lap_times[course :: len(roads)]
                 results[index, direction] = TrackResult(
