@@ -262,7 +262,7 @@ def test_a_driver_says_itself_that_it_sees_the_state():
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"), [({"track": "oval"}, "track is 'oval'; get one"), ({"rules": "drfc"}, "rules is 'drfc'; use")]
+    ("settings", "words"), [({"track": "oval"}, "track is 'oval'; get"), ({"rules": "drfc"}, "rules is 'drfc'; use")]
 )
 def test_what_is_no_track_and_no_rules_is_told(settings, words):
     with pytest.raises(ConfigError, match=words):
