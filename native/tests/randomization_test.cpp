@@ -9,11 +9,13 @@ namespace racecraft {
 namespace {
 
 constexpr uint32_t kEpisodes = 4000;
+constexpr int kNumDrawn = kCondition_strength;  // the others, of which it is a share
 
 // Conditions that change nothing, but for one.
 Conditions neutral() {
     Conditions conditions{};
     conditions.friction = conditions.mass = conditions.speed_gain = conditions.light = 1.0f;
+    conditions.strength = 1.0f;
     return conditions;
 }
 
@@ -59,17 +61,18 @@ struct Moments {
 
 TEST(every_condition_fills_its_range_whatever_the_others_are) {
     Randomization wide{};
-    for (int i = 0; i < kNumConditions; ++i) {
+    for (int i = 0; i < kNumDrawn; ++i) {
         wide.conditions[i] = {static_cast<float>(i), static_cast<float>(2 * i + 1)};
     }
-    Moments moments[kNumConditions];
+    wide.conditions[kCondition_strength] = {1.0f, 1.0f};
+    Moments moments[kNumDrawn];
     int alike = 0;
     for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
         const Conditions drawn = draw_conditions(wide, 7, 3, episode);
         float values[kNumConditions];
         std::memcpy(values, &drawn, sizeof(drawn));
-        double shares[kNumConditions];
-        for (int i = 0; i < kNumConditions; ++i) {
+        double shares[kNumDrawn];
+        for (int i = 0; i < kNumDrawn; ++i) {
             shares[i] = (static_cast<double>(values[i]) - i) / (i + 1.0);
             moments[i].add(shares[i]);
             for (int k = 0; k < i; ++k) alike += std::abs(shares[i] - shares[k]) < 1e-5;
@@ -88,6 +91,33 @@ TEST(a_point_stays_a_point) {
     CHECK(test::same_bits(drawn, neutral()));
 }
 
+TEST(strength_is_the_share_of_the_way_from_nothing_to_what_was_drawn) {
+    Randomization whole{};
+    for (int i = 0; i < kNumDrawn; ++i) whole.conditions[i] = {-2.0f, 3.0f};
+    Randomization half = whole, none = whole, beyond = whole;
+    whole.conditions[kCondition_strength] = {1.0f, 1.0f};
+    half.conditions[kCondition_strength] = {0.5f, 0.5f};
+    none.conditions[kCondition_strength] = {0.0f, 0.0f};
+    beyond.conditions[kCondition_strength] = {-1.0f, 3.0f};
+    Conditions nothing = neutral();
+    nothing.strength = 0.0f;
+    int untouched = 0, full = 0;
+    for (uint32_t episode = 0; episode < kEpisodes; ++episode) {
+        const Conditions all = draw_conditions(whole, 7, 3, episode);
+        const Conditions some = draw_conditions(half, 7, 3, episode);
+        CHECK(test::same_bits(draw_conditions(none, 7, 3, episode), nothing));
+        CHECK_NEAR(some.friction, 0.5f * (1.0f + all.friction), 1e-6);
+        CHECK_NEAR(some.noise, 0.5f * all.noise, 1e-6);
+        const Conditions any = draw_conditions(beyond, 7, 3, episode);
+        CHECK(any.strength >= 0.0f && any.strength <= 1.0f);
+        untouched += any.strength == 0.0f;
+        full += any.strength == 1.0f;
+        if (any.strength == 1.0f) CHECK(test::same_bits(any, all));
+    }
+    CHECK_NEAR(untouched, kEpisodes / 4.0, 100);
+    CHECK_NEAR(full, kEpisodes / 2.0, 120);
+}
+
 TEST(a_range_counts_from_either_end) {
     Randomization randomization = fixed();
     CHECK(!randomization.has_latency());
@@ -101,7 +131,7 @@ TEST(a_range_counts_from_either_end) {
             CHECK(!one.has_cameras());
             one.conditions[i] = range;
             CHECK_EQUAL(one.has_cameras(), is_camera);
-            CHECK_EQUAL(one.has_lens(), i >= kCondition_crowd);
+            CHECK_EQUAL(one.has_lens(), i >= kCondition_crowd && i <= kCondition_noise);
         }
     }
 }
@@ -175,6 +205,10 @@ TEST(red_green_and_blue_light_are_drawn_apart) {
     // A world of one colour is as bright as that colour's light alone.
     Randomization randomization = fixed();
     randomization.tint = {0.5f, 1.5f};
+    Conditions weak = neutral();
+    weak.strength = 0.0f;
+    CHECK(test::same_bits(palette_under(weak, randomization, kPalette2018, 5, 0, 1),
+                          palette_under(neutral(), fixed(), kPalette2018, 5, 0, 1)));
     constexpr double weights[3] = {0.2989, 0.587, 0.114};
     Moments light[3];
     double products[3] = {};
@@ -199,6 +233,10 @@ TEST(red_green_and_blue_light_are_drawn_apart) {
 TEST(every_colour_is_shifted_by_its_own_draw) {
     Randomization randomization = fixed();
     randomization.colour = {-0.2f, 0.2f};
+    Conditions weak = neutral();
+    weak.strength = 0.0f;
+    CHECK(test::same_bits(palette_under(weak, randomization, kPalette2018, 5, 0, 1),
+                          palette_under(neutral(), fixed(), kPalette2018, 5, 0, 1)));
     constexpr int kColours = kNumMaterials + kNumWalls + 2;
     Moments shift[kColours];
     double products[kColours] = {};

@@ -266,7 +266,7 @@ class DevicePlan:
 
     def batch(self, world: int, addresses: Sequence[int]) -> Annotated[NDArray[numpy.uint8], dict(shape=(None,), order='C')]: ...
 
-BATCH_BYTES: int = 1560
+BATCH_BYTES: int = 1568
 
 CAR_THREADS: int = 128
 

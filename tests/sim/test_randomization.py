@@ -18,7 +18,9 @@ from racecraft.track import load_track
 OVAL = load_track("oval")
 SMALL = CameraSpec(width=64, height=48)
 STRAIGHT = np.float32([0.0, 1.5])
-REAL = {name: getattr(PRESETS["real"], name) for name in CONDITIONS[CONDITIONS.index("pale_dashes") :]}
+DRAWN = tuple(name for name in CONDITIONS if name != "strength")
+"""Those that `strength` is a share of."""
+REAL = {name: getattr(PRESETS["real"], name) for name in DRAWN[DRAWN.index("pale_dashes") :]}
 """Ranges of what only `real` draws."""
 
 
@@ -65,16 +67,52 @@ def episodes(simulation: Simulation, count: int) -> np.ndarray:
 def test_draws_fill_their_ranges_evenly_and_independently():
     wide = Randomization(**{name: getattr(PRESETS["strong"], name) for name in CONDITIONS[:16]}, **REAL)
     drawn = episodes(Simulation(OVAL, num_envs=500, camera=None, randomize=wide), 8).reshape(-1, len(CONDITIONS))
-    ranges = np.array([getattr(wide, name) for name in CONDITIONS])
+    drawn = drawn[:, [CONDITIONS.index(name) for name in DRAWN]]
+    ranges = np.array([getattr(wide, name) for name in DRAWN])
     unit = (drawn - ranges[:, 0]) / (ranges[:, 1] - ranges[:, 0])
     assert unit.min() >= 0.0
     assert unit.max() <= 1.0
     error = 5.0 / np.sqrt(len(unit))
     np.testing.assert_allclose(unit.mean(axis=0), 0.5, atol=0.29 * error)
     np.testing.assert_allclose(unit.var(axis=0), 1 / 12, atol=0.09 * error)
-    between = np.corrcoef(unit.T) - np.eye(len(CONDITIONS))
+    between = np.corrcoef(unit.T) - np.eye(len(DRAWN))
     assert np.abs(between).max() < error
     assert len(np.unique(unit, axis=0)) == len(unit)
+
+
+def test_an_episode_without_strength_is_as_without_randomisation_and_one_of_all_as_ever():
+    every = replace(PRESETS["strong"], **REAL)
+    settings = {"num_envs": 6, "camera": SMALL, "seed": 3}
+    pictures = {}
+    for name, ranges in {
+        "nothing": "none",
+        "none of it": replace(every, strength=(0.0, 0.0)),
+        "less than none": replace(every, strength=(-2.0, -1.0)),
+        "all": every,
+        "more than all": replace(every, strength=(2.0, 3.0)),
+        "half": replace(every, strength=(0.5, 0.5)),
+    }.items():
+        simulation = Simulation(OVAL, **settings, randomize=ranges)
+        drive(simulation, 20, np.float32([0.2, 2.0]))
+        pictures[name] = (simulation.vehicles.copy(), simulation.rows.copy(), simulation.frames.copy())
+    for one, other in (("nothing", "none of it"), ("nothing", "less than none"), ("all", "more than all")):
+        for first, second in zip(pictures[one], pictures[other], strict=True):
+            np.testing.assert_array_equal(first, second)
+    away = {name: np.abs(pictures[name][2].astype(float) - pictures["nothing"][2]).mean() for name in ("half", "all")}
+    assert 0.0 < away["half"] < away["all"]
+
+
+def test_what_is_drawn_beyond_none_and_all_of_it_counts_as_the_end():
+    mixed = replace(PRESETS["strong"], strength=(-1.0, 3.0))
+    drawn = episodes(Simulation(OVAL, num_envs=500, camera=None, randomize=mixed), 8).reshape(-1, len(CONDITIONS))
+    strengths, frictions = drawn[:, CONDITIONS.index("strength")], drawn[:, CONDITIONS.index("friction")]
+    assert (strengths.min(), strengths.max()) == (0.0, 1.0)
+    assert np.mean(strengths == 0.0) == pytest.approx(0.25, abs=0.03)
+    assert np.mean(strengths == 1.0) == pytest.approx(0.5, abs=0.03)
+    assert np.all(frictions[strengths == 0.0] == 1.0)
+    assert frictions[strengths == 1.0].min() < 0.61
+    between = (strengths > 0.0) & (strengths < 1.0)
+    assert np.all(frictions[between] >= 1.0 - 0.4 * strengths[between] - 1e-6)
 
 
 def test_a_draw_depends_on_seed_car_and_episode_alone():
@@ -82,7 +120,7 @@ def test_a_draw_depends_on_seed_car_and_episode_alone():
     np.testing.assert_array_equal(
         episodes(Simulation(OVAL, num_envs=2, camera=None, seed=5, randomize="strong"), 3), whole[:, :2]
     )
-    shown = [i for i, name in enumerate(CONDITIONS) if name not in REAL]
+    shown = [i for i, name in enumerate(CONDITIONS) if name in DRAWN and name not in REAL]
     other = episodes(Simulation(OVAL, num_envs=6, camera=None, seed=6, randomize="strong"), 3)
     assert (other != whole)[:, :, shown].all()
     narrower = replace(PRESETS["strong"], friction=(1.0, 1.0), light=(1.0, 1.0))

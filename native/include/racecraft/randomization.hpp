@@ -42,7 +42,8 @@ namespace racecraft {
     X(defocus)         /* pixels of a box */                                                              \
     X(shutter)         /* s that a picture takes: a car that turns smears it */                           \
     X(shake)           /* rad, standard deviation of the lens from picture to picture */                  \
-    X(noise)           /* standard deviation, 1 is white */
+    X(noise)           /* standard deviation, 1 is white */                                               \
+    X(strength)        /* share of all this that the episode has, 0 none to 1 all; drawn beyond, the end */
 
 enum ConditionIndex : int {
 #define RC_INDEX(name) kCondition_##name,
@@ -90,6 +91,17 @@ RC_HD float draw(const Range& range, uint32_t word) {
     return range.low + (range.high - range.low) * uniform_of(word);
 }
 
+// What was drawn, but only a share of its way from what changes nothing. All of it changes no bit.
+RC_HD float weakened(float drawn, float neutral, float strength) {
+    return strength == 1.0f ? drawn : neutral + strength * (drawn - neutral);
+}
+
+RC_HD float neutral_of(int condition) {
+    const bool is_factor = condition == kCondition_friction || condition == kCondition_mass ||
+                           condition == kCondition_speed_gain || condition == kCondition_light;
+    return is_factor ? 1.0f : 0.0f;
+}
+
 RC_HD Conditions draw_conditions(const Randomization& randomization, uint64_t seed, uint32_t car,
                                  uint32_t episode) {
     float values[kNumConditions];
@@ -98,6 +110,11 @@ RC_HD Conditions draw_conditions(const Randomization& randomization, uint64_t se
             philox(seed, car, episode, static_cast<uint32_t>(i / 4), Purpose::conditions);
         values[i] = draw(randomization.conditions[i], block.words[i % 4]);
     }
+    const float strength = clamp(values[kCondition_strength], 0.0f, 1.0f);
+    for (int32_t i = 0; i < kCondition_strength; ++i) {
+        values[i] = weakened(values[i], neutral_of(i), strength);
+    }
+    values[kCondition_strength] = strength;
 #define RC_TAKE(name) values[kCondition_##name],
     return {RC_CONDITIONS(RC_TAKE)};
 #undef RC_TAKE
@@ -131,11 +148,14 @@ RC_HD GreyPalette palette_under(const Conditions& conditions, const Randomizatio
                                 const RgbPalette& colours, uint64_t seed, uint32_t car, uint32_t episode) {
     const RandomBlock tints = philox(seed, car, episode, 0, Purpose::tint);
     float weights[3] = {0.2989f, 0.587f, 0.114f};
-    for (int32_t c = 0; c < 3; ++c) weights[c] *= draw(randomization.tint, tints.words[c]);
+    for (int32_t c = 0; c < 3; ++c) {
+        weights[c] *= weakened(draw(randomization.tint, tints.words[c]), 1.0f, conditions.strength);
+    }
     uint32_t index = 0;
     const auto grey = [&](const uint8_t* rgb) {
         const RandomBlock block = philox(seed, car, episode, index / 4, Purpose::colours);
-        const float shift = 255.0f * draw(randomization.colour, block.words[index % 4]);
+        const float drawn = draw(randomization.colour, block.words[index % 4]);
+        const float shift = 255.0f * weakened(drawn, 0.0f, conditions.strength);
         ++index;
         const float seen = weights[0] * static_cast<float>(rgb[0]) + weights[1] * static_cast<float>(rgb[1]) +
                            weights[2] * static_cast<float>(rgb[2]);

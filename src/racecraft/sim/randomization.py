@@ -86,6 +86,9 @@ class Randomization:
     """rad, standard deviation of where the lens looks from picture to picture."""
     noise: Range = (0.0, 0.0)
     """Standard deviation of every pixel, as a fraction of white."""
+    strength: Range = (1.0, 1.0)
+    """Share of all this that an episode has, 0 none to 1 all. What is drawn beyond counts as the end: ``(-1.0, 3.0)``
+    leaves a quarter of the episodes as they are and a half as strong as can be."""
     tint: Range = (1.0, 1.0)
     """Factor on the light's red, green and blue, drawn for each; grey weighs them afterwards."""
     colour: Range = (0.0, 0.0)
@@ -201,6 +204,7 @@ LIMITS: Final[dict[str, Range]] = {
     "shutter": (0.0, 0.07),
     "shake": (0.0, 0.1),
     "noise": (0.0, 0.2),
+    "strength": (-10.0, 10.0),
     "tint": (0.0, 4.0),
     "colour": (-0.5, 0.5),
 }
