@@ -217,7 +217,7 @@ def test_touring_pays_for_metres_and_not_for_haste_in_a_bend():
     assert paid() == pytest.approx(1.0)
     assert paid(distance_from_center=0.25) == pytest.approx(1.0 - 0.5 * 0.25)
     assert paid(distance_from_center=0.7) == pytest.approx(0.5)
-    at_the_limit = math.degrees(math.atan(0.165 * 2.0 / 2.0**2))  # 2 m/s2 across at 2 m/s
+    at_the_limit = math.degrees(math.atan(0.165 * 2.5 / 2.0**2))  # 2.5 m/s2 across at 2 m/s
     assert paid(steering_angle=at_the_limit) == pytest.approx(1.0)
     assert paid(steering_angle=-at_the_limit, speed=2.0 * math.sqrt(2.0)) == pytest.approx(0.95)
     assert paid(steering_angle=at_the_limit, speed=4.0) == pytest.approx(1.0 - 0.05 * 3.0)

@@ -15,7 +15,7 @@ from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.track import load_tracks
 from racecraft.training import train
-from racecraft.training.recipes import FOLDED_ROADS, RECIPES, TRAFFIC, WIDE_ROADS, with_recipe
+from racecraft.training.recipes import FOLDED_ROADS, MOSTLY_STRONG, RECIPES, TRAFFIC, WIDE_ROADS, with_recipe
 from racecraft.training.start import read_settings
 
 
@@ -42,6 +42,7 @@ def test_the_command_trains_with_what_the_recipe_says(tmp_path: Path) -> None:
     settings = read_settings(folder)
     assert (settings.algorithm, settings.direction, settings.track) == ("distill", "forward", "oval + kidney")
     assert settings.distill == RECIPES["everywhere"]["distill"] != DistillConfig()
+    assert settings.randomize == MOSTLY_STRONG
     assert settings.randomize.friction == (0.6, 1.3)  # strong
     assert folder.read_reward_function() == load_reward("touring")
     assert folder.read_model_metadata().action_space.kind == "continuous"

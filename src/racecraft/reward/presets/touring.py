@@ -1,15 +1,15 @@
 """Tour roads it has never seen: pay for every metre really gained, but not for taking a bend at the limit of the tyres.
 
 As `lap_time`, with two margins. Metres near the border are worth half of those in the middle, and accelerating across
-the road harder than COMFORT costs: that leaves a third of the front tyres' grip for what a driver could not know. It
-remembers where the car was a step ago. Best with `--recipe everywhere`.
+the road harder than COMFORT costs: that leaves a fifth of the front tyres' grip for what a driver could not
+know. It remembers where the car was a step ago. Best with `--recipe everywhere`.
 """
 
 import math
 
 OFF_TRACK_PENALTY = -1.0
 BORDER_LOSS = 0.5  # fraction of the reward that is lost at the border
-COMFORT = 2.0  # m/s2 across the road
+COMFORT = 2.5  # m/s2 across the road
 HASTE_PENALTY = 0.05  # for each time COMFORT beyond it
 WHEELBASE = 0.165  # m
 
