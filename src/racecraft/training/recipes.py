@@ -26,7 +26,7 @@ WIDE_ROADS: Final = ("generated:0..23,width=0.9,radius=0.5", "generated:24..47,w
 """With room to pass a box: as wide as the official routes that races among objects used."""
 
 MOSTLY_STRONG: Final = replace(PRESETS["strong"], strength=(-1.0, 10.0))
-"""One episode in eleven as it is, nine under all of it: who sees how odd a world looks may drive by it."""
+"""One episode in eleven as it is, nine under all of it: faster than all of them, docs/log/generalisation.md."""
 
 TRAFFIC: Final = Objects(
     obstacles=Obstacles(count=4, placement="random"),
