@@ -6,13 +6,13 @@ that learned under many conditions does not rely on any of them.
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
 from racecraft.checks import check_choice, check_number, check_type, require
 from racecraft.errors import ConfigError, did_you_mean
+from racecraft.json_file import write_json_object
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.parameter_file import read_parameters
 from racecraft.sim.vehicle import Vehicle
@@ -168,10 +168,7 @@ class Randomization:
         Raises:
             ConfigError: It cannot be written.
         """
-        try:
-            Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
+        write_json_object(path, asdict(self))
 
 
 LIMITS: Final[dict[str, Range]] = {

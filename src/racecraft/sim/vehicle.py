@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Final
 
 from racecraft.checks import check_number, make_plain
 from racecraft.errors import ConfigError, did_you_mean
+from racecraft.json_file import write_json_object
 from racecraft.sim.parameter_file import read_parameters
 
 
@@ -80,10 +80,7 @@ class Vehicle:
         Raises:
             ConfigError: It cannot be written.
         """
-        try:
-            Path(path).write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error
+        write_json_object(path, asdict(self))
 
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
