@@ -106,3 +106,56 @@ def test_who_ends_a_race_without_a_mouse_goes_on_where_it_was(league: RunningLea
     page.get_by_role("alert").get_by_role("button", name="End the race").press("Enter")
     page.get_by_text("Over", exact=True).wait_for()
     expect(page.locator("#main")).to_be_focused()
+
+
+@needs_axe
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_a_teacher_renames_a_class_closes_it_and_opens_it_again(
+    league: RunningLeague, visit: Visit, language: str
+) -> None:
+    from playwright.sync_api import expect
+
+    group = league.group("Class 7b")
+    pupil = league.join(league.code(group), "Comet")
+    race = ok(league.owner.post(f"/api/groups/{group}/races", json={"title": "Friday cup", "track": "oval"}), 201)["id"]
+    told = {
+        "en": "Name of the group|Rename|Close the group|Cancel|Open the group again|Closed|New race",
+        "de": "Name der Gruppe|Umbenennen|Gruppe schließen|Abbrechen|Gruppe wieder öffnen|Geschlossen|Neues Rennen",
+    }
+    title, rename, close, cancel, again, closed, new_race = told[language].split("|")
+    visit.look("light", language)
+    page = visit.open(f"/groups/{group}", width=360, height=740)
+    button = page.get_by_role("button", name=close, exact=True)
+
+    button.press("Enter")
+    expect(page.get_by_role("alert").get_by_role("button", name=cancel)).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(button).to_be_focused()
+    page.keyboard.press("Enter")
+    visit.complaints.clear()
+    page.get_by_role("alert").get_by_role("button", name=close).press("Enter")
+    page.get_by_text("races are over; these" if language == "en" else "Rennen vorbei sind; diese").wait_for()
+    expect(button).to_be_focused()
+    assert len(visit.complaints) == 1, "of a race that is not over the browser tells that it was refused"
+    visit.complaints.clear()
+    ok(league.owner.delete(f"/api/league/races/{race}"), 204)
+
+    page.get_by_label(title).fill("Class 7b, 2026")
+    page.get_by_role("button", name=rename, exact=True).press("Enter")
+    page.get_by_role("heading", name="Class 7b, 2026").wait_for()
+    button.press("Enter")
+    page.get_by_role("alert").get_by_role("button", name=close).press("Enter")
+    expect(page.get_by_role("button", name=again)).to_be_focused()
+    expect(page.get_by_text(closed, exact=True)).to_be_visible()
+    expect(page.get_by_role("heading", name=new_race)).to_have_count(0)
+    page.get_by_role("status").get_by_text("2026").first.wait_for()
+    assert visit.violations() == []
+    assert visit.overflow() <= 0
+    page.goto(f"{league.console.client.base_url}/league")
+    expect(page.locator("li", has_text="Class 7b, 2026").get_by_text(closed, exact=True)).to_be_visible()
+    assert ok(pupil.get("/api/groups"))[0]["closed"]
+
+    page = visit.open(f"/groups/{group}")
+    page.get_by_role("button", name=again).press("Enter")
+    expect(button).to_be_focused()
+    expect(page.get_by_role("heading", name=new_race)).to_be_visible()

@@ -153,6 +153,7 @@ ROWS: dict[str, tuple[str, Any]] = {
     "POST /api/groups": ("organisers", {"title": "x"}),
     "POST /api/groups/join": ("each", None),
     "GET /api/groups/{group_id}": ("member", None),
+    "PATCH /api/groups/{group_id}": ("organiser", {"title": "x"}),
     "POST /api/groups/{group_id}/joining": ("organiser", {}),
     "DELETE /api/groups/{group_id}/joining": ("organiser", None),
     "POST /api/groups/{group_id}/members": ("organiser", {"people": [{"name": "New"}]}),

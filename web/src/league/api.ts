@@ -61,6 +61,7 @@ export const leagueApi = {
   groups: () => ask<GroupCard[]>("GET", "/groups"),
   group: (id: number) =>
     ask<GroupDetail>("GET", `/groups/${id}`).then((found) => ({ ...found, members: namesShown(found.members) })),
+  changeGroup: (id: number, change: Partial<Schemas["GroupChange"]>) => ask<void>("PATCH", `/groups/${id}`, change),
   makeGroup: (title: string) => ask<GroupCard>("POST", "/groups", { title }),
   open: (id: number, uses: number, hours: number) => ask<JoiningInfo>("POST", `/groups/${id}/joining`, { uses, hours }),
   close: (id: number) => ask<void>("DELETE", `/groups/${id}/joining`),

@@ -3,7 +3,8 @@
     invitation ──code──▶ join: an account, and a member of the group      (a class scans the code from the wall)
     organiser ──names──▶ members with cards                               (a class gets printed cards)
 
-To who is not in a group it does not exist.
+To who is not in a group it does not exist. One that is closed keeps all that it has: nobody comes in, and no race is
+made.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from racecraft.serve.people.keys import SIGNS, hold_account, plain_code
 from racecraft.serve.people.names import checked_name
 from racecraft.serve.people.people import Person, Role, add_person, use_invitation
 from racecraft.serve.problems import Conflict, NotFound
+from racecraft.serve.races.state import state_of
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Card, Group, Identity, Invitation, Member, User, now
+from racecraft.serve.store.tables import Card, Group, Identity, Invitation, Member, Race, User, now
 
 Part = Literal["organiser", "racer"]
 CODE_LENGTH: Final = 8
@@ -47,6 +49,17 @@ class GroupMember:
     is_home: bool
     """Whether they came in here."""
     has_password: bool
+
+
+@dataclass(frozen=True)
+class GroupOfMine:
+    """A group as one of those that somebody is in."""
+
+    id: int
+    title: str
+    part: Part
+    racers: int
+    closed: datetime | None
 
 
 @dataclass(frozen=True)
@@ -89,14 +102,41 @@ class Groups:
             session.add(Member(group_id=group.id, user_id=by.id, role="organiser"))
             return group.id
 
-    def of(self, user_id: int) -> list[tuple[int, str, Part, int]]:
-        """Number, title, one's own part and how many racers, of the groups that somebody is in, newest first."""
+    def of(self, user_id: int) -> list[GroupOfMine]:
+        """The groups that somebody is in, those that are closed last, else the newest first."""
         others = aliased(Member)
         racers = sa.select(sa.func.count()).where(others.group_id == Group.id, others.role == "racer")
-        query = sa.select(Group.id, Group.title, Member.role, racers.scalar_subquery())
+        query = sa.select(Group.id, Group.title, Member.role, racers.scalar_subquery(), Group.closed)
         query = query.join(Member, Member.group_id == Group.id).where(Member.user_id == user_id)
+        query = query.order_by(sa.case((Group.closed.is_(None), 0), else_=1), Group.id.desc())
         with self._database.transaction() as session:
-            return [(row[0], row[1], _part(row[2]), row[3]) for row in session.execute(query.order_by(Group.id.desc()))]
+            return [
+                GroupOfMine(id=row[0], title=row[1], part=_part(row[2]), racers=row[3], closed=row[4])
+                for row in session.execute(query)
+            ]
+
+    def change(self, group_id: int, *, title: str | None = None, is_closed: bool | None = None) -> None:
+        """Call a group otherwise, close it or open it again; None leaves it as it is. Its code is gone with closing.
+
+        Raises:
+            Conflict: It is to be closed, and not all of its races are over.
+        """
+        with self._database.transaction() as session:
+            hold_group(session, group_id)  # nobody comes in meanwhile, nor is a race made
+            group = session.get_one(Group, group_id)
+            if title is not None:
+                group.title = title.strip()
+            if is_closed is False:
+                group.closed = None
+            if is_closed and group.closed is None:
+                _require_over(session, group_id)
+                session.execute(sa.delete(Invitation).where(Invitation.group_id == group_id))
+                group.closed = now()
+
+    def closed(self, group_id: int) -> datetime | None:
+        """Since when a group is closed; None of one that is open."""
+        with self._database.transaction() as session:
+            return session.get_one(Group, group_id).closed
 
     def title(self, group_id: int) -> str:
         """Of a group."""
@@ -170,7 +210,7 @@ class Groups:
         """New accounts in a group, by name and real name; their numbers.
 
         Raises:
-            Conflict: A name is taken, or the group is full; nobody is added.
+            Conflict: A name is taken, or the group is full or closed; nobody is added.
         """
         with self._database.transaction() as session:
             _require_room(session, group_id, len(people))
@@ -228,14 +268,18 @@ class Groups:
             session.execute(sa.delete(Member).where(Member.group_id == group_id, Member.user_id == user_id))
 
     def open(self, group_id: int | None, *, role: Role, uses: int, hours: int) -> Joining:
-        """A new code; of a group an earlier one is worth nothing from now on."""
+        """A new code; of a group an earlier one is worth nothing from now on.
+
+        Raises:
+            Conflict: The group is closed.
+        """
         code = "".join(secrets.choice(SIGNS) for _ in range(CODE_LENGTH))
         invitation = Invitation(
             code=code, group_id=group_id, role=role, uses_left=uses, expires=now() + timedelta(hours=hours)
         )
         with self._database.transaction() as session:
             if group_id is not None:
-                hold_group(session, group_id)  # of two at the same moment the second finds the other's
+                require_open(session, group_id)  # of two at the same moment the second finds the other's
                 session.execute(sa.delete(Invitation).where(Invitation.group_id == group_id))
             session.add(invitation)
         return Joining(code, uses, invitation.expires)
@@ -336,9 +380,35 @@ def hold_group(session: Session, group_id: int) -> None:
     session.execute(sa.update(Group).where(Group.id == group_id).values(title=Group.title))
 
 
-def _require_room(session: Session, group_id: int, more: int) -> None:
-    """Refuse more members than a group may have; nobody else comes in until the transaction ends."""
+def require_open(session: Session, group_id: int) -> None:
+    """Refuse what a group that is closed does not do, and keep it from being closed until the transaction ends.
+
+    Raises:
+        Conflict: It is closed.
+    """
     hold_group(session, group_id)
+    if session.get_one(Group, group_id, populate_existing=True).closed is not None:
+        raise Conflict("The group is closed.", hint="Who organises it can open it again.")
+
+
+def _require_over(session: Session, group_id: int) -> None:
+    """Refuse as long as a race of a group can be entered, now or later.
+
+    Raises:
+        Conflict: One can.
+    """
+    races = session.scalars(sa.select(Race).where(Race.group_id == group_id, Race.deleted.is_(None)).order_by(Race.id))
+    titles = [repr(race.title) for race in races if state_of(race) != "closed"]
+    if titles:
+        raise Conflict(
+            f"A group is closed when its races are over; these are not: {', '.join(titles)}.",
+            hint="End them or put them away first.",
+        )
+
+
+def _require_room(session: Session, group_id: int, more: int) -> None:
+    """Refuse more members than a group may have, or any if it is closed; nobody else comes in until all is written."""
+    require_open(session, group_id)
     count = session.scalar(sa.select(sa.func.count()).where(Member.group_id == group_id)) or 0
     if count + more > MAX_MEMBERS:
         raise Conflict(f"A group has at most {MAX_MEMBERS} members; this one has {count}.")

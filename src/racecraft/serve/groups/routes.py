@@ -16,6 +16,7 @@ from racecraft.serve.groups.groups import Joining
 from racecraft.serve.groups.schemas import (
     CopyModel,
     GroupCard,
+    GroupChange,
     GroupDetail,
     JoiningInfo,
     MemberChange,
@@ -44,18 +45,15 @@ Id = Annotated[int, Path(ge=0, lt=2**31)]
 
 @router.get("/groups")
 def list_groups(consoles: InConsoles, person: InPerson) -> list[GroupCard]:
-    """The groups that one is in, newest first."""
-    return [
-        GroupCard(id=number, title=title, part=part, racers=racers)
-        for number, title, part, racers in consoles.groups.of(person.id)
-    ]
+    """The groups that one is in, those that are closed last, else the newest first."""
+    return [GroupCard(**vars(group)) for group in consoles.groups.of(person.id)]
 
 
 @router.post("/groups", status_code=201)
 def create_group(request: NewGroup, consoles: InConsoles, person: InPerson) -> GroupCard:
     """A new group; only organisers make them."""
     number = consoles.groups.create(request.title, by=person)
-    return GroupCard(id=number, title=request.title.strip(), part="organiser", racers=0)
+    return GroupCard(id=number, title=request.title.strip(), part="organiser", racers=0, closed=None)
 
 
 @router.post("/groups/join")
@@ -80,9 +78,18 @@ def get_group(group_id: Id, request: Request, consoles: InConsoles, person: InPe
         title=consoles.groups.title(group_id),
         part=part,
         racers=sum(member.role == "racer" for member in members),
+        closed=consoles.groups.closed(group_id),
         members=[MemberInfo(**{**vars(member), **({} if part == "organiser" else HIDDEN)}) for member in members],
         joining=_joining(request, consoles, joining) if joining is not None else None,
     )
+
+
+@router.patch("/groups/{group_id}", status_code=204)
+def change_group(group_id: Id, body: GroupChange, consoles: InConsoles, person: InPerson) -> Response:
+    """Another title; or close a group whose races are over, so that nobody comes in and no race is made; or open it."""
+    consoles.groups.require(group_id, person.id, organiser=True)
+    consoles.groups.change(group_id, title=body.title, is_closed=body.is_closed)
+    return Response(status_code=204)
 
 
 @router.post("/groups/{group_id}/joining")

@@ -17,10 +17,20 @@ RealName = Annotated[str, Field(max_length=100), PLAIN]
 Hours = Annotated[int, Field(ge=1, le=24 * 365)]
 
 
+Title = Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S"), PLAIN]
+
+
 class NewGroup(Message):
     """A class, a club, an event."""
 
-    title: Annotated[str, Field(min_length=1, max_length=100, pattern=r"\S"), PLAIN]
+    title: Title
+
+
+class GroupChange(Message):
+    """Another title, or whether it is closed: nobody comes in and no race is made; what is left out stays."""
+
+    title: Title | None = None
+    is_closed: bool | None = None
 
 
 class GroupCard(Message):
@@ -30,6 +40,8 @@ class GroupCard(Message):
     title: str
     part: Part
     racers: int
+    closed: datetime | None
+    """Since when nobody comes in and no race is made; None while it is open."""
 
 
 class MemberInfo(Message):

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import sqlalchemy as sa
+from sqlalchemy.orm import Session
 
 from racecraft.contest.finals import FinalTerms
 from racecraft.contest.terms import RaceTerms, race_terms
@@ -95,7 +96,13 @@ class Races:
         self._share, self._see, self._replays, self._user_id = share, see, replays, user_id
 
     def create(
-        self, request: NewRace, *, user_id: int, group_id: int | None = None, final: FinalTerms | None = None
+        self,
+        request: NewRace,
+        *,
+        user_id: int,
+        group_id: int | None = None,
+        final: FinalTerms | None = None,
+        permit: Callable[[Session], object] = lambda _: None,
     ) -> int:
         """Make a race, of a league's group if one is given; its id.
 
@@ -104,9 +111,10 @@ class Races:
             user_id: Who holds it.
             group_id: For whom.
             final: Of a race in which two meet at a time.
+            permit: Raises, in the transaction in which it is made, if it may not be.
 
         Raises:
-            RacecraftError: The track or a setting is not usable.
+            RacecraftError: The track or a setting is not usable, or what `permit` raises.
         """
         opens = request.opens or now()
         if request.closes is not None and request.closes <= opens:
@@ -125,6 +133,7 @@ class Races:
         announced = terms.announcement
         with self._database.transaction() as session:
             hold_account(session, user_id)  # two at the same moment count each other
+            permit(session)
             held = sa.and_(Race.owner_id == user_id, Race.deleted.is_(None))
             if (session.scalar(sa.select(sa.func.count(Race.id)).where(held)) or 0) >= MAX_RACES:
                 raise Conflict(f"There are {MAX_RACES} races already.", hint="Delete some first.")

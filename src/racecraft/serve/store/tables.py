@@ -148,6 +148,8 @@ class Group(Table):
     id: Mapped[int] = mapped_column(primary_key=True)
     title: Mapped[str] = mapped_column(String(100))
     created: Mapped[datetime] = mapped_column(default=now)
+    closed: Mapped[datetime | None]
+    """Since when nobody comes in and no race is made; all that is there stays."""
 
 
 class Member(Table):

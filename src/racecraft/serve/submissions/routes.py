@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from functools import partial
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, Query, Request, Response
@@ -15,6 +16,7 @@ from racecraft.judging.race import FORMAT
 from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
 from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, InPerson
+from racecraft.serve.groups.groups import require_open
 from racecraft.serve.races.replays import replay_of, trial_of
 from racecraft.serve.races.schemas import MAX_CARS, RaceReplay
 from racecraft.serve.schemas import RunName
@@ -59,7 +61,8 @@ def create_league_race(group_id: Id, body: NewLeagueRace, consoles: InConsoles, 
     """A race for a group."""
     consoles.groups.require(group_id, person.id, organiser=True)
     final = consoles.league.announce(body, group_id)
-    number = consoles.of(person.id).races.create(body, user_id=person.id, group_id=group_id, final=final)
+    races, permit = consoles.of(person.id).races, partial(require_open, group_id=group_id)
+    number = races.create(body, user_id=person.id, group_id=group_id, final=final, permit=permit)
     consoles.league.begin(number, body)
     return consoles.league.get(number, person.id)
 
