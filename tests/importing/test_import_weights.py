@@ -14,8 +14,9 @@ from runs_made import nothing_was_made
 
 from racecraft import evaluate, resume, train
 from racecraft.agent import Hyperparameters
-from racecraft.errors import SourceError
+from racecraft.errors import ConfigError, SourceError
 from racecraft.importing import import_run
+from racecraft.importing.model_files import find_models
 from racecraft.race import RULE_SETS, load_driver
 from racecraft.race import evaluate as drive
 from racecraft.run import RunFolder
@@ -102,6 +103,49 @@ def test_best_last_a_named_one_or_none(tmp_path: Path) -> None:
     assert any("model_8.pb was taken of 3 states" in note for note in notes)
     with pytest.raises(SourceError, match="--checkpoint 8 asks for weights, and --network begins with fresh ones"):
         imported(folder, checkpoint="8", network="RACECRAFT_SMALL")
+
+
+def test_of_two_models_of_one_iteration_the_user_names_one(tmp_path: Path) -> None:
+    folders = {f"{place}/model_7.pb": models.GRAPH for place in ("mine", "theirs")}
+    folder = models.as_folder({**small(), **folders}, tmp_path / "m")
+    for checkpoint in ("best", "last", "7", "model_7.pb"):
+        with pytest.raises(SourceError, match=r"holds 2 models of iteration 7: mine/model_7\.pb, theirs/model_7\.pb\."):
+            imported(folder, checkpoint=checkpoint)
+    found = import_run(folder, checkpoint="mine/model_7.pb")
+    assert found.used["mine/model_7.pb"] == "weights of the policy"
+    (folder / "theirs/model_7.pb").rename(folder / "theirs/model_8.pb")
+    assert import_run(folder, name="by-number", checkpoint=7).used["mine/model_7.pb"] == "weights of the policy"
+    with pytest.raises(SourceError, match="has no checkpoint 'bset'") as refused:
+        imported(folder, checkpoint="bset")
+    assert refused.value.hint == "Did you mean 'best'?"
+    for checkpoint in (None, 7.0, Path("model_7.pb")):
+        with pytest.raises(ConfigError, match=r"checkpoint is .*; use best, last, none, an iteration or a file's name"):
+            import_run(folder, checkpoint=checkpoint)
+    for path in (5, None):
+        with pytest.raises(ConfigError, match=r"path is .*; use the path of a folder"):
+            import_run(path)
+
+
+def test_what_belongs_together_of_the_states_of_a_model() -> None:
+    def states(*names: str) -> list[tuple[int, str, str]]:
+        return [(model.steps, model.path, model.graph) for model in find_models(names)]
+
+    def pair(name: str) -> tuple[str, str]:
+        return f"{name}.index", f"{name}.data-00000-of-00001"
+
+    assert states(*pair("model/8_Step-90.ckpt"), "agent/model_8.pb") == [
+        (90, "model/8_Step-90.ckpt", "agent/model_8.pb")
+    ]
+    index, data = pair("8_Step-90.ckpt")
+    assert states(f"a/{index}", f"b/{data}") == states(index, pair("8_Step-95.ckpt")[1]) == []  # halves of two
+    assert states(*pair("8_Step-90.ckpt"), *pair("8_Step-95.ckpt"), "model_8.pb") == [
+        (90, "8_Step-90.ckpt", ""),
+        (95, "8_Step-95.ckpt", "model_8.pb"),
+    ]
+    assert states(*pair("a/8_Step-90.ckpt"), "a/model_8.pb", "b/model_8.pb") == [
+        (-1, "b/model_8.pb", "b/model_8.pb"),
+        (90, "a/8_Step-90.ckpt", "a/model_8.pb"),
+    ]
 
 
 def test_weights_of_which_nobody_knows_what_they_answer(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
+from racecraft.checks import check_type
 from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
@@ -102,7 +103,7 @@ def import_run(
     track: str = "",
     reward: str | Path = "",
     network: str = "",
-    checkpoint: str = BEST,
+    checkpoint: str | int = BEST,
 ) -> ImportedRun:
     """Make a run from files of the original.
 
@@ -120,6 +121,8 @@ def import_run(
     Raises:
         RacecraftError: Nothing is understood, something is wrong in the files, or hostile. No run was made.
     """
+    check_type("checkpoint", checkpoint, (str, int), "use best, last, none, an iteration or a file's name")
+    checkpoint = str(checkpoint)
     with ExitStack() as stack:
         source = stack.enter_context(open_source(path))
         model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))

@@ -49,10 +49,14 @@ class ModelFiles:
         return bool(self.index and self.data)
 
     @property
+    def path(self) -> str:
+        """The file that is read, without the endings of a pair."""
+        return self.index.removesuffix(".index") if self.is_checkpoint else self.graph
+
+    @property
     def name(self) -> str:
-        """The file that is read, without its folder and endings of a pair."""
-        path = self.index.removesuffix(".index") if self.is_checkpoint else self.graph
-        return path.rpartition("/")[2]
+        """The same without its folder."""
+        return self.path.rpartition("/")[2]
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -61,22 +65,34 @@ class ModelFiles:
 
 
 def find_models(names: Iterable[str]) -> list[ModelFiles]:
-    """Every state of the model among files, in the order of its training; one without a number comes first."""
-    numbered: dict[int, ModelFiles] = {}
+    """Every state of the model among files, in the order of its training; one without a number comes first.
+
+    A checkpoint and a graph of one iteration are the same state, but where several folders have that iteration only
+    those of one folder are.
+    """
+    pairs: dict[tuple[str, int, int], dict[str, str]] = {}  # folder, iteration, steps -> paths by their ending
+    graphs: dict[tuple[str, int], str] = {}
     others: list[ModelFiles] = []
     for path in sorted(names):
-        base = path.rpartition("/")[2]
+        folder, _, base = path.rpartition("/")
         checkpoint, graph = _CHECKPOINT.fullmatch(base), _GRAPH.fullmatch(base)
         if checkpoint is not None:
-            number = int(checkpoint[2])
-            known = replace(numbered.get(number, ModelFiles(iteration=number)), steps=int(checkpoint[3]))
-            numbered[number] = replace(known, index=path) if checkpoint[4] == "index" else replace(known, data=path)
+            pairs.setdefault((folder, int(checkpoint[2]), int(checkpoint[3])), {})[checkpoint[4]] = path
         elif graph is not None:
-            number = int(graph[1])
-            numbered[number] = replace(numbered.get(number, ModelFiles(iteration=number)), graph=path)
+            graphs[folder, int(graph[1])] = path
         elif base.endswith(".pb"):
             others.append(ModelFiles(graph=path))
-    return [*others, *(model for _, model in sorted(numbered.items()) if model.graph or model.is_checkpoint)]
+    numbered = []
+    for (folder, iteration, steps), paths in sorted(pairs.items(), reverse=True):  # the later of two takes the graph
+        if len(paths) != 2:
+            continue
+        there = [place for place in graphs if place[1] == iteration]
+        is_alone = len(there) == 1 and sum(key[1] == iteration and len(pairs[key]) == 2 for key in pairs) == 1
+        graph_path = graphs.pop(there[0] if is_alone else (folder, iteration), "")
+        index, data = paths["index"], paths["data-00000-of-00001"]
+        numbered.append(ModelFiles(iteration=iteration, steps=steps, graph=graph_path, index=index, data=data))
+    numbered += [ModelFiles(iteration=iteration, graph=path) for (_, iteration), path in graphs.items()]
+    return [*others, *sorted(numbered, key=lambda model: (model.iteration, model.steps, model.path))]
 
 
 def choose_model(source: Source, names: Iterable[str], wanted: str, notes: list[str]) -> ModelFiles | None:
@@ -101,41 +117,63 @@ def choose_model(source: Source, names: Iterable[str], wanted: str, notes: list[
         return None
     said = _said(source, names)
     plain = [model for model in models if model.iteration < 0]
-    if said.get(wanted, -1) >= 0:
-        for model in models:
-            if model.iteration == said[wanted]:
-                return model
-        notes.append(f"The {wanted} checkpoint, of iteration {said[wanted]}, is not among the files.")
+    if wanted in said:
+        if meant := _of(models, said[wanted]):
+            return _only(meant, source)
+        notes.append(f"The {wanted} checkpoint, of iteration {_iteration(said[wanted])}, is not among the files.")
     if plain and (wanted == BEST or len(plain) == len(models)):
-        if len(plain) > 1:
-            listed = ", ".join(model.graph[-80:] for model in plain[:5])
-            raise SourceError(
-                f"{source.title} holds {len(plain)} graphs: {listed}.", hint="Name one with --checkpoint FILE."
-            )
-        return plain[0]
-    chosen = next((model for model in models if model.iteration == said.get(LAST, -1) >= 0), models[-1])
+        return _only(plain, source)
+    highest = [model for model in models if model.iteration == models[-1].iteration]
+    chosen = _only(_of(models, said.get(LAST, "")) or highest, source)
     if len(models) > 1:
         notes.append(f"{chosen.name} was taken of {len(models)} states of the model; --checkpoint chooses another.")
     return chosen
 
 
+def _only(models: list[ModelFiles], source: Source) -> ModelFiles:
+    """The one state that is meant.
+
+    Raises:
+        SourceError: There are several: nobody knows which of them is the model.
+    """
+    if len(models) == 1:
+        return models[0]
+    listed, hint = ", ".join(model.path[-80:] for model in models[:5]), "Name one with --checkpoint FILE."
+    if models[0].iteration < 0:
+        raise SourceError(f"{source.title} holds {len(models)} graphs: {listed}.", hint=hint)
+    raise SourceError(
+        f"{source.title} holds {len(models)} models of iteration {models[0].iteration}: {listed}.", hint=hint
+    )
+
+
+def _of(models: list[ModelFiles], checkpoint: str) -> list[ModelFiles]:
+    """Those that a checkpoint's name means: of its iteration, and of its steps where some are."""
+    iteration = _iteration(checkpoint)
+    of_the_iteration = [model for model in models if model.iteration == iteration >= 0]
+    return [model for model in of_the_iteration if model.name == checkpoint] or of_the_iteration
+
+
 def _named(models: list[ModelFiles], wanted: str, source: Source) -> ModelFiles:
     number = _NUMBER.fullmatch(wanted)
-    for model in models:
-        is_it = wanted in (model.graph, model.name, model.graph.rpartition("/")[2])
-        if is_it or (number is not None and model.iteration == int(number[1])):
-            is_graph = wanted.endswith(".pb") and bool(model.graph)
+    by_path = [model for model in models if wanted in (model.path, model.graph)]
+    by_name = [model for model in models if wanted in (model.name, model.graph.rpartition("/")[2])]
+    by_number = [model for model in models if number is not None and model.iteration == int(number[1])]
+    for found in (by_path, by_name, by_number):
+        if found:
+            is_graph = wanted.endswith(".pb") and bool(found[0].graph)
+            model = _only(found, source)
             return replace(model, index="", data="") if is_graph else model
     known = [model.name for model in models]
     listed = ", ".join(known[:10]) or "no weights"
     raise SourceError(
-        f"{source.title} has no checkpoint {wanted[:80]!r}; it has {listed}.", hint=did_you_mean(wanted, known)
+        f"{source.title} has no checkpoint {wanted[:80]!r}; it has {listed}.",
+        hint=did_you_mean(wanted, (BEST, LAST, NONE, *known)),
     )
 
 
-def _said(source: Source, names: list[str]) -> Mapping[str, int]:
-    """Iterations of the best and the last checkpoint by the files that say so; what is damaged says nothing."""
-    said: dict[str, int] = {}
+def _said(source: Source, names: list[str]) -> Mapping[str, str]:
+    """Names of the best and the last checkpoint by the files that say so; what is damaged says nothing."""
+    said: dict[str, str] = {}
     for path in sorted(names, reverse=True):
         base = path.rpartition("/")[2]
         if base not in (CHECKPOINTS_FILE, COACH_FILE) or source.files[path].path is None:
@@ -143,12 +181,12 @@ def _said(source: Source, names: list[str]) -> Mapping[str, int]:
         with suppress(ConfigError):
             text = source.text(path)
             if base == COACH_FILE:
-                said.setdefault(LAST, _iteration(text.strip()))
+                said.setdefault(LAST, text.strip())
                 continue
             for which, entry in parse_json_object(text, name=path).items():
                 if isinstance(entry, dict) and which in ("best_checkpoint", "last_checkpoint"):
-                    said[which.removesuffix("_checkpoint")] = _iteration(str(entry.get("name", "")))
-    return said
+                    said[which.removesuffix("_checkpoint")] = str(entry.get("name", ""))
+    return {which: name for which, name in said.items() if _iteration(name) >= 0}
 
 
 def _iteration(name: str) -> int:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError, SourceError, typed
 from racecraft.importing.archive import DEFAULT_LIMITS, read_archive
 from racecraft.importing.archive_guard import CHUNK, Limits
@@ -97,9 +98,11 @@ def open_source(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterato
     """List what is there; what was taken from an archive is gone after the block.
 
     Raises:
+        ConfigError: The path is none.
         SourceError: There is nothing, or nothing of a kind that is understood.
         ArchiveError: The archive is damaged or hostile.
     """
+    check_type("path", path, (str, os.PathLike), "use the path of a folder, an archive or a reward function")
     path = Path(path)
     try:
         is_folder, is_file = path.is_dir(), path.is_file()
