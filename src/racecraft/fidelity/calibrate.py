@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_number
+from racecraft.checks import check_number, check_whole
 from racecraft.errors import RunError
 from racecraft.fidelity.dynamics import REPORTED_STEPS, Windows, reported_errors, windows_of
+from racecraft.fidelity.given import log_files, track_of, vehicle_of
 from racecraft.fidelity.logs import GIVE_APART, Faults, Log, read_logs
 from racecraft.fidelity.rules import require_length
-from racecraft.sim.vehicle import LIMITS, Vehicle, load_vehicle
-from racecraft.track import load_track
+from racecraft.sim.vehicle import LIMITS, Vehicle
 
 if TYPE_CHECKING:
     from racecraft.track.track import Track
@@ -75,10 +75,10 @@ class Calibration:
 
 
 def calibrate(
-    logs: str | Path | Sequence[str | Path],
+    logs: str | Path | Iterable[str | Path],
     *,
-    vehicle: str | Vehicle = "v5",
-    track: str | Track | None = None,
+    vehicle: str | Path | Vehicle = "v5",
+    track: str | Path | Track | None = None,
     held_out: float = 0.3,
     num_windows: int = 2000,
     iterations: int = 12,
@@ -95,12 +95,14 @@ def calibrate(
 
     Raises:
         RunError: The logs cannot be read, or hold too little driving.
-        ConfigError: A setting is out of range.
+        ConfigError: There is no log, or a setting is out of range.
+        TrackError: There is no such track.
     """
     check_number("held_out", held_out, 0.05, 0.9)
-    start = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
-    road = load_track(track) if isinstance(track, str) else track
-    windows, moved = _load([logs] if isinstance(logs, str | Path) else list(logs), road)
+    check_whole("num_windows", num_windows, MIN_WINDOWS)
+    check_whole("iterations", iterations, 1)
+    start = vehicle_of(vehicle)
+    windows, moved = _load(log_files(logs), None if track is None else track_of(track))
     fit, judged = _split(windows, held_out, num_windows)
     car = _fit(start, fit, iterations)
     return Calibration(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type, require
 from racecraft.fidelity.differences import Differences
 from racecraft.fidelity.dynamics import (
     KNOWN_ROWS,
@@ -22,12 +24,12 @@ from racecraft.fidelity.dynamics import (
     reported_errors,
     windows_of,
 )
+from racecraft.fidelity.given import log_files, track_of, vehicle_of
 from racecraft.fidelity.logs import GIVE_APART, Faults, Log, read_logs
 from racecraft.fidelity.rules import RulesAgreement, TrackRules, require_agreement, require_length
-from racecraft.sim.vehicle import Vehicle, load_vehicle
-from racecraft.track import load_track
 
 if TYPE_CHECKING:
+    from racecraft.sim.vehicle import Vehicle
     from racecraft.track.track import Track
 
 REWARD_TOLERANCE: Final = 1.0001e-4
@@ -99,10 +101,10 @@ class Comparison:
 
 
 def replay(
-    logs: str | Path | Sequence[str | Path],
+    logs: str | Path | Iterable[str | Path],
     *,
-    track: str | Track,
-    vehicle: str | Vehicle = "v5",
+    track: str | Path | Track,
+    vehicle: str | Path | Vehicle = "v5",
     reward: str | None = None,
     rows: str | Path | None = None,
 ) -> Comparison:
@@ -117,11 +119,18 @@ def replay(
 
     Raises:
         RunError: A log cannot be read, or was not driven on this track.
+        ConfigError: There is no log, or no such vehicle, or the reward is no source.
+        TrackError: There is no such track.
         RewardError: The reward function is not valid or fails.
     """
-    paths = [logs] if isinstance(logs, str | Path) else list(logs)
-    road = load_track(track) if isinstance(track, str) else track
-    car = load_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    if rows is not None:
+        check_type("rows", rows, (str, os.PathLike), "use a CSV file's path")
+    paths, road, car = log_files(logs), track_of(track), vehicle_of(vehicle)
+    if reward is not None:
+        from racecraft.reward import preset_names
+
+        is_source = isinstance(reward, str) and reward not in preset_names() and not reward.endswith(".py")
+        require("reward", reward, is_source, "its source, which racecraft.reward.load_reward(NAME_OR_FILE) reads")
     rules, agreement, faults, differences = TrackRules(road), RulesAgreement(), Faults(), Differences(rows)
     result = Comparison(road, car, agreement, faults, differences, np.zeros((0, len(REPORTED_STEPS), 2)), ())
     checked: set[str] = set()

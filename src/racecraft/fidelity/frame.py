@@ -7,6 +7,7 @@ Every candidate is drawn by the camera that trains, so what fits is what a polic
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,12 +16,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError
+from racecraft.fidelity.given import track_of
 from racecraft.fidelity.likeness import edge_offsets, mean_difference, structural_similarity
 from racecraft.scoped_warnings import scoped_warnings
 from racecraft.sim.camera import LUMA, CameraSpec
 from racecraft.sim.views import Scene, driver_frames
-from racecraft.track.load import load_track
 from racecraft.track.track import Track
 
 MAX_BYTES: Final = 20_000_000  # of a frame's file
@@ -105,8 +107,9 @@ def fit_frame(frame: str | Path, *, track: str | Path | Track, palette: str = "2
         ConfigError: The file is no such picture.
         TrackError: The track cannot be used.
     """
+    check_type("frame", frame, (str, os.PathLike), "use a picture's path")
     picture = _read(Path(frame))
-    road = track if isinstance(track, Track) else load_track(track)
+    road = track_of(track)
     camera = CameraSpec(palette=palette)
     seen = network_frame(picture)
     best = _search(road, camera, seen)
