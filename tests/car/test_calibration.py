@@ -101,6 +101,10 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
     MEASURED.save(tmp_path / "car.json")
     assert load_calibration(tmp_path / "car.json") == MEASURED
     assert load_calibration("car") == CarCalibration()
+    with pytest.raises(ConfigError, match=r"car\.json cannot be written"):
+        MEASURED.save(tmp_path / "nowhere" / "car.json")
+    with pytest.raises(ConfigError, match=r"car is 5; use 'car' or a file's path\."):
+        load_calibration(5)  # type: ignore[arg-type]
 
 
 WRONG_NUMBERS: dict[str, tuple[dict[str, Any], str]] = {
@@ -120,6 +124,13 @@ WRONG_NUMBERS: dict[str, tuple[dict[str, Any], str]] = {
     "slower with more": ({"speeds": [(30.0, 1.0), (60.0, 0.9)]}, "both rising"),
     "one slider twice": ({"speeds": [(30.0, 1.0), (30.0, 1.1)]}, "both rising"),
     "a slider beyond": ({"slider": 101.0}, "slider_percent is 101.0; allowed is a number from 1 to 100"),
+    "one circle": ({"circles": 0.75}, "circles is 0.75; allowed is two diameters in m"),
+    "a single circle": ({"circles": (0.75,)}, "circles is (0.75,); allowed is two diameters in m"),
+    "one width": ({"servo": 1.2}, "servo is 1.2; allowed is three pulse widths"),
+    "widths in a text": ({"servo": "1.2,1.45,1.7"}, "servo is '1.2,1.45,1.7'; allowed is three pulse widths"),
+    "a speed alone": ({"speeds": 0.7}, "speeds is 0.7; allowed is at most 20 pairs"),
+    "speeds by their sliders": ({"speeds": {30: 0.7}}, "speeds is {30: 0.7}; allowed is at most 20 pairs"),
+    "speeds of texts": ({"speeds": [("a", 1.0), (2.0, 3.0)]}, "speeds: slider is 'a'"),
     "a latency of a second": ({"latency": 1.0}, "latency_seconds is 1.0"),
 }
 

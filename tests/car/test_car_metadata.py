@@ -75,8 +75,14 @@ def test_a_lidar_comes_with_all_seven_keys(sensor: str, distance: float, sectors
         "clipping_distance": distance,
         "num_sectors": sectors,
     }
-    assert any("needs the sensor kit" in note for note in car_notes(metadata, spec))
+    kit = f"The standard car has one camera in front: it takes the sensor kit to have {sensor}."
+    assert kit in car_notes(metadata, spec)
     assert any("lidar_config" in note for note in car_notes(metadata, spec))
+
+
+def test_all_that_is_of_the_sensor_kit_is_named() -> None:
+    notes = car_notes(*of(action_space("default"), ("STEREO_CAMERAS", "LIDAR")))
+    assert any("it takes the sensor kit to have STEREO_CAMERAS, LIDAR." in note for note in notes)
 
 
 def test_what_the_car_cannot_do_is_refused() -> None:

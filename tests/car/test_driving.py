@@ -148,13 +148,16 @@ def test_the_camera_has_the_look_that_the_run_was_trained_with(tmp_path: Path) -
     assert outcome.evaluation.conditions.camera == replace(CAMERAS_BY_NAME["2026"], width=640, height=480)
 
 
-def test_latency_is_the_randomisation_s(run: Path) -> None:
-    car = CarCalibration(latency_seconds=0.05, slider_percent=33.333)
+def test_latency_is_the_randomisation_s(run: Path, tmp_path: Path) -> None:
+    car = tmp_path / "car.json"
+    CarCalibration(latency_seconds=0.05, slider_percent=33.333).save(car)
     outcome = evaluate_as_car(run, car=car, laps=1, num_trials=1, max_resets=0, video=False, num_threads=1)
     assert outcome.evaluation.conditions.randomize.latency == pytest.approx((0.75, 0.75))
     assert json.loads(outcome.files["summary"].read_text())["as_car"]["slider_driven_percent"] == 33.3
     with pytest.raises(ConfigError, match="has a latency, and so has the randomisation"):
         evaluate_as_car(run, car=car, randomize=Randomization(latency=(0.5, 0.5)), video=False)
+    with pytest.raises(ConfigError, match="car is None; use 'car' or a file's path"):
+        evaluate_as_car(run, car=None, video=False)  # type: ignore[arg-type]
 
 
 def test_a_dot_lies_where_the_command_and_what_came_of_it_say(tmp_path: Path) -> None:

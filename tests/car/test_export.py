@@ -17,7 +17,7 @@ import pytest
 from racecraft import load_track, train
 from racecraft.car import export_run
 from racecraft.car.export import read_exported
-from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError, SourceError
 from racecraft.importing import import_run
 from racecraft.learn import PPOConfig
 from racecraft.race import RULE_SETS, evaluate, load_driver
@@ -153,7 +153,9 @@ WRONG = {
     "another ending": ({"output": "model.zip"}, ConfigError, "takes only names that end in .tar.gz"),
     "a dot": ({"output": "my.model.tar.gz"}, ConfigError, "cuts names at the first dot"),
     "a space": ({"output": "my model.tar.gz"}, ConfigError, "replaces spaces"),
-    "no name": ({"output": ".tar.gz"}, ConfigError, "use letters, digits, - and _"),
+    "no name": ({"output": ".tar.gz"}, ConfigError, "use 1 to 64 letters, digits, - and _"),
+    "a long name": ({"output": f"{65 * 'a'}.tar.gz"}, ConfigError, "use 1 to 64 letters, digits, - and _"),
+    "a number for a file": ({"output": 5}, ConfigError, "output is 5; use a file's path"),
     "a checkpoint that is not there": ({"checkpoint": 77}, CheckpointError, "77"),
     "another target": ({"to": "bike"}, ConfigError, "--to is 'bike'; allowed are car, onnx, tflite, openvino"),
     "an archive as ONNX": (
@@ -190,6 +192,30 @@ def test_a_run_that_a_car_cannot_sense_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="DISCRETIZED_SECTOR_LIDAR"):
         export_run(run)
     assert not list(run.glob("*.tar.gz"))
+
+
+def test_what_holds_no_model_of_a_car_is_one_sentence(run: Path, tmp_path: Path) -> None:
+    metadata, graph = ("model_metadata.json", b"{}"), ("agent/model.pb", b"x")
+    for name, members, says in (
+        ("empty-but-for-a-note", [("note.txt", b"hello")], "has no model_metadata.json at its root"),
+        ("no-metadata", [graph], "has no model_metadata.json at its root"),
+        ("in-a-folder", [(f"mine/{path}", data) for path, data in (metadata, graph)], "has no model_metadata.json"),
+        ("no-graph", [metadata], "has no agent/model.pb"),
+    ):
+        path = tmp_path / f"{name}.tar.gz"
+        with tarfile.open(path, "w:gz") as tar:
+            for member, data in members:
+                info = tarfile.TarInfo(member)
+                info.size = len(data)
+                tar.addfile(info, io.BytesIO(data))
+        with pytest.raises(SourceError) as caught:
+            read_exported(path)
+        assert f"archive {path.name} {says}" in str(caught.value)
+        assert caught.value.hint.startswith("Give an archive that racecraft export wrote; racecraft import reads")
+    with pytest.raises(SourceError, match=r"folder .* has no agent/model\.pb"):
+        read_exported(run)
+    with pytest.raises(ConfigError, match="path is 5; use the path of"):
+        read_exported(5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("kept", [0, 1, 30, 300, 1000, -1])

@@ -39,7 +39,7 @@ def check_archive_name(path: Path) -> None:
     if not _NAME.fullmatch(path.name.removesuffix(ENDING)):
         raise ConfigError(
             f"The archive is to be called {path.name!r}; a car cuts names at the first dot and replaces spaces: "
-            "use letters, digits, - and _."
+            "use 1 to 64 letters, digits, - and _."
         )
 
 

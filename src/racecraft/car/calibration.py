@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,8 +17,8 @@ import numpy as np
 
 from racecraft.agent.action_space import MAX_SPEED, MAX_STEERING, MIN_SPEED, ActionSpace
 from racecraft.car.command import Floats, largest, steering_share, throttle
-from racecraft.checks import check_number, require
-from racecraft.errors import ConfigError, RunError, did_you_mean
+from racecraft.checks import check_number, check_type, require
+from racecraft.errors import ConfigError, did_you_mean
 from racecraft.json_file import write_json_object
 from racecraft.sim.parameter_file import read_parameters
 
@@ -112,12 +113,9 @@ class CarCalibration:
         """Write a file that `load_calibration` reads.
 
         Raises:
-            RunError: It cannot be written.
+            ConfigError: It cannot be written.
         """
-        try:
-            write_json_object(path, asdict(self))
-        except OSError as error:
-            raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
+        write_json_object(path, asdict(self))
 
 
 def load_calibration(name_or_path: str | Path) -> CarCalibration:
@@ -126,6 +124,7 @@ def load_calibration(name_or_path: str | Path) -> CarCalibration:
     Raises:
         ConfigError: No such file, or a value outside its range.
     """
+    check_type("car", name_or_path, (str, PathLike), f"use {NOMINAL!r} or a file's path")
     if str(name_or_path) == NOMINAL:
         return CarCalibration()
     data = read_parameters(name_or_path, kind="Car", presets=[NOMINAL])
@@ -164,6 +163,8 @@ def calibrate(
         raise ConfigError(
             "Nothing was measured.", hint="Give --circle-left, --circle-right, --servo, --speed, --slider or --latency."
         )
+    is_pair = isinstance(circles, list | tuple) and len(circles) == 2
+    require("circles", circles, is_pair, "two diameters in m, to the left and to the right, None for one not measured")
     reach: tuple[float, float] = (SERVO_REACH, SERVO_REACH)
     if servo is not None:
         reach = _reach(servo)
@@ -182,7 +183,7 @@ def calibrate(
     return CarCalibration(
         left_degrees=locks[0],
         right_degrees=locks[1],
-        speeds=tuple(sorted(speeds)),
+        speeds=tuple(sorted(_points(speeds, is_sorted=False))),
         slider_percent=slider,
         latency_seconds=latency,
     )
@@ -191,7 +192,7 @@ def calibrate(
 def _reach(servo: Sequence[float]) -> tuple[float, float]:
     """From straight to either lock, ms."""
     allowed = "three pulse widths of 0.5 to 2.5 ms: full left, straight, full right, straight between the others"
-    require("servo", list(servo), len(servo) == 3, allowed)
+    require("servo", servo, isinstance(servo, list | tuple) and len(servo) == 3, allowed)
     for width in servo:
         check_number("servo", width, 0.5, 2.5)
     left, middle, right = servo
@@ -199,8 +200,8 @@ def _reach(servo: Sequence[float]) -> tuple[float, float]:
     return abs(left - middle), abs(right - middle)
 
 
-def _points(given: Any) -> tuple[tuple[float, float], ...]:
-    """Speeds, checked: a file may hold anything."""
+def _points(given: Any, *, is_sorted: bool = True) -> tuple[tuple[float, float], ...]:
+    """Speeds, checked: a file may hold anything; who measures may do so in any order."""
     allowed = f"at most {MAX_POINTS} pairs of slider in percent and speed in m/s, both rising"
     is_list = isinstance(given, list | tuple) and len(given) <= MAX_POINTS
     require(
@@ -210,7 +211,7 @@ def _points(given: Any) -> tuple[tuple[float, float], ...]:
         check_number("speeds: slider", position, 1.0, 100.0)
         check_number("speeds: speed", speed, 0.05, 10.0)
     points = tuple((float(position), float(speed)) for position, speed in given)
-    rising = all(a[0] < b[0] and a[1] < b[1] for a, b in pairwise(points))
+    rising = not is_sorted or all(a[0] < b[0] and a[1] < b[1] for a, b in pairwise(points))
     require("speeds", list(points), rising, allowed)
     return points
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from racecraft.agent.action_space import MAX_SPEED
-from racecraft.car.calibration import CarCalibration
+from racecraft.car.calibration import CarCalibration, load_calibration
 from racecraft.car.command import as_driven
 from racecraft.car.driving import CAR_CAMERA, CarPolicy
 from racecraft.car.export import export_run, read_exported
@@ -34,7 +34,7 @@ UNMEASURED: Final = CarCalibration()
 def evaluate_as_car(
     run: str | Path,
     *,
-    car: CarCalibration = UNMEASURED,
+    car: CarCalibration | str | Path = UNMEASURED,
     randomize: Randomization | str | Path = "none",
     **settings: Any,
 ) -> RunEvaluation:
@@ -42,33 +42,34 @@ def evaluate_as_car(
 
     Args:
         run: The run folder.
-        car: What was measured on the car.
+        car: What was measured on the car, or its file.
         randomize: Of `evaluate_run`; its latency is the car's, where the car has one.
         **settings: All others of `evaluate_run`.
 
     Raises:
         RacecraftError: As `evaluate_run` and `export_run`.
     """
+    measured = car if isinstance(car, CarCalibration) else load_calibration(car)
     drivers: list[CarPolicy] = []
 
     def load(folder: RunFolder, *, checkpoint: str | int, num_threads: int) -> tuple[int, NetworkPolicy]:
         with tempfile.TemporaryDirectory(prefix="racecraft-car-") as place:
             exported = export_run(folder.path, output=Path(place) / "model.tar.gz", checkpoint=checkpoint)
             policy = read_exported(exported.file, num_threads=num_threads)
-        drivers.append(CarPolicy(policy, car))
+        drivers.append(CarPolicy(policy, measured))
         return exported.step, drivers[0]
 
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
-    if car.latency_seconds:
-        steps = car.latency_seconds / CONTROL_DT
+    if measured.latency_seconds:
+        steps = measured.latency_seconds / CONTROL_DT
         if randomize.latency != (0.0, 0.0):
             raise ConfigError("The car has a latency, and so has the randomisation.", hint="Leave one of them away.")
         randomize = replace(randomize, latency=(steps, steps))
     folder = RunFolder.open(run)
     space = as_driven(folder.read_model_metadata().action_space)
     camera = replace(trained_camera(folder.read_info()), width=CAR_CAMERA.width, height=CAR_CAMERA.height)
-    about = {"as_car": {**asdict(car), "slider_driven_percent": round(100 * car.slider(space), 1)}}
+    about = {"as_car": {**asdict(measured), "slider_driven_percent": round(100 * measured.slider(space), 1)}}
     outcome = evaluate_run(run, load=load, camera=camera, randomize=randomize, about=about, **settings)
     (driver,) = drivers
     picture = draw_commands(
@@ -76,6 +77,6 @@ def evaluate_as_car(
         np.concatenate(driver.resulting),
         driver.listed,
         outcome.files["summary"].with_name(PICTURE),
-        note=TOO_FAST if car.fastest(space) > MAX_SPEED else "",
+        note=TOO_FAST if measured.fastest(space) > MAX_SPEED else "",
     )
     return replace(outcome, files={**outcome.files, "as a car": picture})

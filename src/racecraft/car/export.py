@@ -6,6 +6,7 @@ run -> policy -> graph, metadata -> *export_run* -> NAME.tar.gz -> *read_exporte
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,8 +15,8 @@ from racecraft.car.archive import GRAPH, METADATA, archive_name, car_archive, ch
 from racecraft.car.converters import openvino_model, tflite_model
 from racecraft.car.metadata import car_metadata, car_notes
 from racecraft.car.policy_graph import policy_graph, policy_onnx, policy_output, sensor_inputs
-from racecraft.checks import check_choice
-from racecraft.errors import ConfigError, RunError
+from racecraft.checks import check_choice, check_type
+from racecraft.errors import ConfigError, RunError, SourceError
 from racecraft.importing.model_files import ModelFiles
 from racecraft.importing.source import open_source
 from racecraft.importing.weights import open_model, read_weights
@@ -72,6 +73,8 @@ def export_run(
             the target needs is not installed.
     """
     check_choice("--to", to, TARGETS)
+    if output is not None:
+        check_type("output", output, (str, PathLike), "use a file's path")
     folder = RunFolder.open(run)
     ending = ENDINGS.get(to, "")
     name = folder.name + ending if ending else archive_name(folder.name)
@@ -124,6 +127,10 @@ def read_exported(archive: str | Path, *, num_threads: int = 1) -> NetworkPolicy
         RacecraftError: The archive is damaged, or of another kind.
     """
     with open_source(archive) as source:
+        for name, where in ((METADATA, " at its root"), (GRAPH, "")):
+            if name not in source.files:
+                hint = "Give an archive that racecraft export wrote; racecraft import reads every other one."
+                raise SourceError(f"{source.title} has no {name}{where}.", hint=hint)
         metadata = ModelMetadata.from_dict(parse_json_object(source.text(METADATA), name=METADATA), name=METADATA)
         space, suite = metadata.action_space, metadata.suite
         spec = NetworkSpec(

@@ -68,7 +68,7 @@ def car_notes(metadata: ModelMetadata, spec: NetworkSpec) -> list[str]:
         notes.append("The car clips what SAC squashes, so the graph ends in the hyperbolic tangent.")
     kit = [name for name in metadata.sensors if name in _KIT]
     if kit:
-        notes.append(f"The standard car has one camera in front: {' and '.join(kit)} needs the sensor kit.")
+        notes.append(f"The standard car has one camera in front: it takes the sensor kit to have {', '.join(kit)}.")
     if "STEREO_CAMERAS" in metadata.sensors:
         notes.append("Community software that runs TFLite is reported to mix up the two pictures of STEREO_CAMERAS.")
     if metadata.suite.lidar_name:
