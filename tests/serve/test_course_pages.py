@@ -133,3 +133,38 @@ def test_who_reads_the_choices_by_keyboard_has_not_answered_yet(visit: Visit) ->
     page.keyboard.press("Enter")
     expect(cards.first.get_by_role("radio").first).to_be_focused()
     expect(page.locator("fieldset :checked")).to_have_count(0)
+
+
+def test_what_is_answered_without_a_network_is_kept_and_sent_when_there_is_one(visit: Visit) -> None:
+    from playwright.sync_api import expect
+
+    def kept(number: int) -> tuple[bool, float | None]:
+        cards = visit.console.client.get("/api/lessons").json()
+        progress = next(card["progress"] for card in cards if card["facts"]["number"] == number)
+        return progress["is_read"], progress["quiz"]
+
+    visit.look("light", "en")
+    page = visit.open("/lessons/6")
+    page.locator("fieldset").first.wait_for()
+    page.context.set_offline(True)
+    answer(page, 6)
+    page.get_by_text("stays in this browser and is sent when it does").wait_for()
+    assert page.get_by_text("Nothing was done").count() == 0
+    assert kept(6)[1] is None
+    page.context.set_offline(False)
+    expect(page.get_by_text("quiz 100 %")).to_be_visible()
+    assert kept(6) == (True, 1.0)
+
+    page = visit.open("/lessons/7")
+    page.locator("fieldset").first.wait_for()
+    page.context.set_offline(True)
+    answer(page, 7)
+    page.get_by_text("stays in this browser and is sent when it does").wait_for()
+    page.goto("about:blank")  # and the page is gone
+    page.context.set_offline(False)
+    assert kept(7)[1] is None
+    page = visit.open("/lessons")
+    expect(page.locator("li", has_text=find_lesson(7).facts.title.en).get_by_text("quiz 100 %")).to_be_visible()
+    assert kept(7) == (True, 1.0)
+    assert all("ERR_INTERNET_DISCONNECTED" in complaint for complaint in visit.complaints)
+    visit.complaints.clear()

@@ -36,6 +36,8 @@ export const de: Record<CourseKey, string> = {
   course: "Kurs",
   missing: "Diese Lektion gibt es nicht.",
   play: "Zum Spielen",
+  kept_unsent:
+    "Die Konsole antwortet nicht. Was du gelesen und beantwortet hast, bleibt in diesem Browser und wird gesendet, sobald sie antwortet.",
   kept_here: "Was du gelesen und beantwortet hast, steht in diesem Browser.",
   step: "Ein Schritt",
   run: "Laufen lassen",

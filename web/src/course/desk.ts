@@ -1,7 +1,11 @@
 /** Where lessons come from and where progress is kept: a console, or a site that has no server. */
-import { ask } from "../api/client";
+import { ask, Problem } from "../api/client";
 import type { components } from "../api/schema";
 import type { Language } from "../i18n/index.svelte";
+import { who } from "../league/who.svelte";
+import { say } from "../lib/toasts.svelte";
+import { c } from "./text";
+import { keep, sendAll, unsentOf } from "./unsent";
 
 type Schemas = components["schemas"];
 export type LessonFacts = Schemas["LessonFacts"];
@@ -26,10 +30,27 @@ export interface Desk {
   href(number?: number): string;
 }
 
+const send = (lesson: number, step: Step) => ask<LessonProgress>("PUT", `/lessons/${lesson}/progress`, step);
+/** Whose steps are kept: of a console that is no league's there is one person. */
+const person = () => who.me?.id ?? 0;
+
 export const consoleDesk: Desk = {
-  list: () => ask<LessonCard[]>("GET", "/lessons"),
+  list: async () => {
+    await sendAll(person(), send);
+    return ask<LessonCard[]>("GET", "/lessons");
+  },
   lesson: (number) => ask<LessonPage>("GET", `/lessons/${number}`),
-  record: (lesson, step) => ask<LessonProgress>("PUT", `/lessons/${lesson.number}/progress`, step),
+  record: async (lesson, step) => {
+    try {
+      return await send(lesson.number, step);
+    } catch (error) {
+      if (!(error instanceof Problem && error.code === "Offline")) throw error;
+      if (unsentOf(person()).length === 0) say(c("kept_unsent")); // once is enough
+      keep({ person: person(), lesson: lesson.number, step });
+      await sendAll(person(), send);
+      return await send(lesson.number, {}); // nothing more: what there is now
+    }
+  },
   picture: (lesson, name, language) => `/api/lessons/${lesson.number}/pictures/${name}?language=${language}`,
   href: (number) => (number === undefined ? "/lessons" : `/lessons/${number}`),
 };

@@ -34,6 +34,8 @@ export const en = {
   course: "Course",
   missing: "There is no such lesson.",
   play: "To play with",
+  kept_unsent:
+    "The console does not answer. What you have read and answered stays in this browser and is sent when it does.",
   kept_here: "What you have read and answered is kept in this browser.",
   step: "One step",
   run: "Run",
