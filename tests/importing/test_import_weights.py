@@ -156,6 +156,35 @@ def test_weights_of_which_nobody_knows_what_they_answer(tmp_path: Path) -> None:
     assert not any("model_7" in note for note in imported(folder, checkpoint="none")[1])
     with pytest.raises(SourceError, match=r"has no model_metadata\.json"):
         imported(folder, checkpoint="7")
+    (folder / "reward_function.py").unlink()
+    with pytest.raises(SourceError, match=r"has model_7\.pb, but no model_metadata\.json, .* and no") as told:
+        imported(folder)
+    assert "Put the model's own model_metadata.json beside it." in told.value.hint
+
+
+def test_settings_that_lie_elsewhere_are_not_left_out_in_silence(tmp_path: Path) -> None:
+    files = {"reward/reward_function.py": models.REWARD, "meta/model_metadata.json": models.METADATA}
+    notes = imported(models.as_folder(files, tmp_path / "m"))[1]
+    assert "meta/model_metadata.json was left out: the model's own would lie in reward/." in notes
+    files = {"reward_function.py": models.REWARD, "hp/hyperparameters.json": models.HYPERPARAMETERS}
+    notes = imported(models.as_folder(files, tmp_path / "n"))[1]
+    assert "hp/hyperparameters.json was left out: the model's own would lie in the outermost folder." in notes
+    files = {**models.DRFC, "defaults/hyperparameters.json": "{}"}
+    del files["custom_files/hyperparameters.json"]
+    assert not any("defaults/" in note for note in imported(models.as_folder(files, tmp_path / "o"))[1])
+
+
+def test_what_is_said_of_weights_that_do_not_fit(tmp_path: Path) -> None:
+    folder = models.as_folder({**small(4), "model_7.pb": models.GRAPH}, tmp_path / "m")
+    with pytest.raises(SourceError, match=r"chooses from 3 actions, and model_metadata\.json lists 4") as told:
+        imported(folder)
+    assert "Is this the model_metadata.json that it was trained with?" in told.value.hint
+    broken = {f"model/7_Step-70.ckpt.{end}": "x" for end in ("index", "data-00000-of-00001")}
+    folder = models.as_folder({**small(), **broken, "model/model_7.pb": models.GRAPH}, tmp_path / "n")
+    with pytest.raises(SourceError, match="7_Step-70") as told:
+        imported(folder)
+    assert "With --checkpoint model/model_7.pb it begins with those of its graph." in told.value.hint
+    assert imported(folder, checkpoint="model/model_7.pb")[0] == "model_7.pb"
 
 
 def test_a_model_drives_with_the_actions_that_it_learned_with(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
-from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
+from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean, typed
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
@@ -35,6 +35,7 @@ from racecraft.importing.layout import (
     SYSTEM_ENV,
     TRAINING_PARAMS,
     find_root,
+    is_of_others,
     role,
 )
 from racecraft.importing.model_files import BEST, LAST, NONE, ModelFiles, choose_model, find_models
@@ -78,6 +79,8 @@ class _Model:
     """Whose weights the run begins with."""
     is_pretrained: bool = False
     """They are those of another model, which this one was to go on from."""
+    unread: str = ""
+    """Weights of which nobody knows what they answer."""
 
     def find(self, name: str) -> str:
         """Path of a settings file, or an empty string."""
@@ -93,6 +96,14 @@ class _Model:
     def shown(self, name: str) -> str:
         """A path below the model's root."""
         return name.removeprefix(self.root)
+
+    def note_elsewhere(self, name: str) -> None:
+        """Say where a settings file lies that is none of this model's."""
+        found = [file for file in self.source.files if file.endswith(f"/{name}") and not is_of_others(file)]
+        self.notes += [
+            f"{file} was left out: the model's own would lie in {self.root or 'the outermost folder'}."
+            for file in sorted(found)[:1]
+        ]
 
 
 def import_run(
@@ -151,7 +162,7 @@ def import_run(
         model.unused.update(job.unused)
         tensors = None
         if own is None and model.weights is not None:
-            with _or_fresh_weights():
+            with _or_other_weights(model.weights):
                 tensors = stack.enter_context(open_model(source, model.weights))
         if own is not None:
             settings = own.settings
@@ -169,7 +180,7 @@ def import_run(
         spec = settings.network_spec(metadata)
         weights: Weights = {}
         if tensors is not None:
-            with _or_fresh_weights():
+            with _or_other_weights(model.weights):
                 weights = read_weights(tensors, spec, metadata.suite, model.notes)
         if network:
             model.used[f"--network {network}"] = "network"
@@ -251,7 +262,8 @@ def _find_weights(model: _Model, checkpoint: str, network: str) -> ModelFiles | 
                 f"{model.source.title} has no {METADATA}, without which nobody knows what weights answer."
             )
         if checkpoint == BEST and (found := find_models(names)):
-            model.notes.append(f"{found[-1].name} was left out: without a {METADATA} nobody knows what it answers.")
+            model.unread = found[-1].name
+            model.notes.append(f"{model.unread} was left out: without a {METADATA} nobody knows what it answers.")
         return None
     drfc = model.drfc
     if drfc is not None and drfc.pretrained and not find_models(names):
@@ -283,12 +295,14 @@ def _read_own(model: _Model, checkpoint: str, track: str, *, is_other: bool) -> 
 
 
 @contextmanager
-def _or_fresh_weights() -> Iterator[None]:
+def _or_other_weights(weights: ModelFiles | None) -> Iterator[None]:
     """Within, an error of the weights says how to do without them."""
     try:
         yield
     except SourceError as error:
         hint = f"{error.hint} With --checkpoint none the run begins with fresh weights.".strip()
+        if weights is not None and weights.is_checkpoint and weights.graph:
+            hint = f"{hint} With --checkpoint {typed(weights.graph)} it begins with those of its graph."
         raise SourceError(str(error), hint=hint) from error
 
 
@@ -318,6 +332,12 @@ def _read_reward(model: _Model, reward: str | Path) -> str:
                 f"{model.source.title} has no {REWARD} of its own, but experiments.",
                 hint=f"Import the folder of one of them, which is in {EXPERIMENTS}/.",
             )
+        if model.unread:
+            raise SourceError(
+                f"{model.source.title} has {model.unread}, but no {METADATA}, without which nobody knows what it "
+                f"answers, and no {REWARD} to train anew with.",
+                hint=f"Put the model's own {METADATA} beside it. --reward FILE or PRESET begins with fresh weights.",
+            )
         raise SourceError(
             f"{model.source.title} has no {REWARD}, without which nothing can be trained.",
             hint="Give one with --reward: a file, or a preset such as centerline; 'racecraft reward list' lists them.",
@@ -340,6 +360,7 @@ def _read_metadata(model: _Model) -> ModelMetadata:
     name = model.find(METADATA)
     if not name:
         model.notes.append(f"There is no {METADATA}: Racecraft's own actions and network were chosen.")
+        model.note_elsewhere(METADATA)
         return ModelMetadata(action_space=action_space("default"), neural_network="RACECRAFT_SMALL")
     metadata, shown = _metadata_in(model, name), model.shown(name)
     if model.weights is not None and not model.is_pretrained:
@@ -371,9 +392,11 @@ def _read_hyperparameters(model: _Model, metadata: ModelMetadata) -> Hyperparame
     if not name and model.weights is not None and model.root + RUN not in model.source.files:
         # ours are for small networks that know nothing: a step of theirs would ruin what this one has learned
         model.notes.append(f"There is no {HYPERPARAMETERS}: it goes on with AWS's defaults.")
+        model.note_elsewhere(HYPERPARAMETERS)
         return Hyperparameters()
     if not name:
         model.notes.append(f"There is no {HYPERPARAMETERS}: it trains with Racecraft's own settings.")
+        model.note_elsewhere(HYPERPARAMETERS)
         return None
     shown = model.shown(name)
     hyperparameters = Hyperparameters.from_dict(parse_json_object(model.source.text(name), name=shown), name=shown)

@@ -78,6 +78,11 @@ def is_plain(name: str) -> bool:
     return all(_PLAIN.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
 
 
+def is_of_others(name: str) -> bool:
+    """Whether a path leads through a folder of deepracer-for-cloud that holds what is of other models."""
+    return not set(_FOLDERS_OF_OTHERS).isdisjoint(name.split("/")[:-1])
+
+
 def find_root(names: Iterable[str], *, source: str) -> str:
     """The folder of the model among all files: ``""``, or a path that ends in ``/``.
 
@@ -104,7 +109,7 @@ def find_root(names: Iterable[str], *, source: str) -> str:
             f"{source} holds nothing that is understood: neither {REWARD} nor {METADATA} nor {RUN_ENV}.",
             hint="Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
         )
-    own = {root: marks for root, marks in roots.items() if not set(root.split("/")) & set(_FOLDERS_OF_OTHERS)} or roots
+    own = {root: marks for root, marks in roots.items() if not is_of_others(root)} or roots
     trained = [root for root, marks in own.items() if {REWARD, TRAINING_PARAMS} <= marks]
     own = {root: marks for root, marks in own.items() if not _is_bucket(root, marks, trained)}
     candidates = [root for root, marks in own.items() if any(mark.endswith(REWARD) for mark in marks)] or list(own)

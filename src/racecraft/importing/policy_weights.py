@@ -81,6 +81,12 @@ def policy_weights(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite) ->
             f"{tensors.name} holds no policy of this kind: it has no {head}/kernel.",
             hint="Do action_space_type and training_algorithm in model_metadata.json belong to this model?",
         )
+    outputs = tensors.shapes[f"{scope}/{head}/kernel"][-1:]
+    if spec.is_discrete and outputs != (spec.num_actions,) and len(outputs) == 1:
+        raise SourceError(
+            f"{tensors.name} chooses from {outputs[0]} actions, and model_metadata.json lists {spec.num_actions}.",
+            hint="Is this the model_metadata.json that it was trained with?",
+        )
     weights = _tower(tensors, spec, sensors, scope=scope, head=head, tower="policy")
     log_std = f"{scope}/ppo_head_0/policy_log_std"
     if not spec.is_discrete and log_std in tensors.shapes:
