@@ -196,3 +196,13 @@ def test_a_trial_that_is_not_continuous_forgives_nothing(tmp_path: Path) -> None
     rules = json.loads((found.run / "race_rules.json").read_text())
     assert (rules["is_continuous"], rules["max_resets"], rules["direction"]) == (False, 0, "reverse")
     assert any("DR_EVAL_MAX_RESETS has no effect" in note for note in found.notes)
+
+
+def test_what_a_job_has_of_the_cloud_is_told_from_what_another_race_would_read(tmp_path: Path) -> None:
+    params = "WORLD_NAME: oval\nAWS_REGION: us-east-1\nNUMBER_OF_BOT_CARS: 3\nNUMBER_OF_OBSTACLES: 2\n"
+    folder = models.as_folder({**models.MODEL, "training_params.yaml": params}, tmp_path / "m")
+    found = import_run(folder, name="x")
+    assert found.unused["AWS_REGION"] == "is not read here; kept"
+    elsewhere = {found.unused[name] for name in ("NUMBER_OF_BOT_CARS", "NUMBER_OF_OBSTACLES")}
+    assert elsewhere == {"has no effect in a race of type TIME_TRIAL; kept"}
+    assert RunFolder.open(found.run).read_training_params().extra["AWS_REGION"] == "us-east-1"

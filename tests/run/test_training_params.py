@@ -66,7 +66,12 @@ def test_defaults(tmp_path):
         ("A: [", "not valid YAML at line"),
         ("A: !!python/object/apply:os.system ['true']", "has a YAML tag"),
         ("a: &x [1, 1]\nb: *x", "YAML alias"),
-        ("RACE_TYPE: DRAG", "RACE_TYPE is 'DRAG'; allowed is TIME_TRIAL"),
+        (
+            "RACE_TYPE: DRAG",
+            "RACE_TYPE is 'DRAG'; allowed is TIME_TRIAL, OBJECT_AVOIDANCE, HEAD_TO_BOT, HEAD_TO_MODEL, F1",
+        ),
+        ("WORLD_NAME: oval\nWORLD_NAME: hairpin\n", "gives 'WORLD_NAME' twice."),
+        ("{A: 1, B: A, 'A': 2}", "gives 'A' twice."),
         ("WORLD_NAME: 3", "WORLD_NAME is 3; allowed is a track's name"),
         ("REVERSE_DIR: maybe", "REVERSE_DIR is 'maybe'; allowed is true or false"),
         ("ROUND_ROBIN_ADVANCE_DIST: 1.5", "ROUND_ROBIN_ADVANCE_DIST is 1.5; allowed is 0 to 1"),
@@ -85,6 +90,11 @@ def test_bad_files(text, words):
         TrainingParams.from_yaml(text, name="t.yaml")
     assert words in str(error.value)
     assert str(error.value).startswith("t.yaml")
+
+
+def test_names_inside_of_values_are_none_of_the_file():
+    params = TrainingParams.from_yaml("A:\n  B: 1\nB: [A, A]\nC:\n- A: 1\n- A: 2\nD: A\n")
+    assert params.extra == {"A": {"B": 1}, "B": ["A", "A"], "C": [{"A": 1}, {"A": 2}], "D": "A"}
 
 
 def test_unreadable_files(tmp_path):

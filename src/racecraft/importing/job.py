@@ -93,7 +93,9 @@ def job_settings(params: TrainingParams, given: Mapping[str, str]) -> JobSetting
         if has_aws_meaning(params.race_type, name):
             becomes[name] = "objects on the track"
         else:
-            unused[name] = ELSEWHERE.get(name, f"means nothing in a race of type {params.race_type}; kept")
+            elsewhere = any(has_aws_meaning(race, name) for race in (OBJECT_AVOIDANCE, HEAD_TO_BOT))
+            why = f"has no effect in a race of type {params.race_type}; kept" if elsewhere else "is not read here; kept"
+            unused[name] = ELSEWHERE.get(name, why)
     return JobSettings(
         values=values,
         used={label: becomes[field] for field, label in given.items() if field in becomes},

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, get_args
 
 from racecraft.errors import ConfigError
 from racecraft.json_file import read_text
@@ -35,7 +35,7 @@ class TrainingParams:
 
     world_name: Annotated[str, Field(min_length=1, max_length=200, description="a track's name")] = "reinvent_base"
     """Track."""
-    race_type: Annotated[RaceType, Field(description="TIME_TRIAL, OBJECT_AVOIDANCE, HEAD_TO_BOT, ...")] = "TIME_TRIAL"
+    race_type: Annotated[RaceType, Field(description=", ".join(get_args(RaceType)))] = "TIME_TRIAL"
     """What else is on the track."""
     reverse_dir: Annotated[bool, Field(description=_YES_NO)] = False
     """Drive against the track's direction."""
@@ -79,12 +79,17 @@ class TrainingParams:
         from racecraft.agent.aws_file import validate
 
         try:
-            depth = 0
+            depth, keys, is_key = 0, set[str](), False  # the stream is a level of its own
             for token in yaml.scan(text, Loader=yaml.SafeLoader):
                 kind = type(token).__name__
                 depth += kind.endswith("StartToken") - kind.endswith("EndToken")
                 if depth > MAX_DEPTH:  # before the parser, which takes quadratic time in the depth
                     raise ConfigError(f"{name} is nested too deeply.")
+                if is_key and depth == 2 and isinstance(token, yaml.ScalarToken):
+                    if token.value in keys:
+                        raise ConfigError(f"{name} gives {token.value[:80]!r} twice.")
+                    keys.add(token.value)
+                is_key = kind == "KeyToken"
                 if kind in _REFUSED:
                     raise ConfigError(f"{name} has {_REFUSED[kind]}, which is not allowed.")
                 if isinstance(token, yaml.ScalarToken) and token.plain and len(token.value) > MAX_PLAIN:
