@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, is_number, require
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, did_you_mean
 
 COLOURS = ("red", "green")
 
@@ -67,6 +67,8 @@ def test_a_misspelt_choice_is_guessed() -> None:
         check_choice("colour", "grren", COLOURS)
     assert str(error.value) == "colour is 'grren'; allowed are red, green."
     assert error.value.hint == "Did you mean 'green'?"
+    assert did_you_mean("FRONT", ["Front", "front_left"]) == "Did you mean 'Front'?"
+    assert did_you_mean("ovl", ["OVAL", "oval"]) == "Did you mean 'OVAL'?"  # the first of two that are alike
     for value in (None, 3, ["red"], np.array(["red", "green"])):
         with pytest.raises(ConfigError, match="allowed are red, green"):
             check_choice("colour", value, COLOURS)

@@ -136,15 +136,16 @@ def typed(path: object) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string.
+    """A suggestion such as ``Did you mean 'oval'?`` for a misspelt name, or an empty string; capitals do not count.
 
     Comparing takes the product of their lengths: a stranger's names are compared only where they are short and few.
     """
     if len(name) > MOST_CHARACTERS:
         return ""
-    short = (one for one in known if len(one) <= MOST_CHARACTERS)
-    close = difflib.get_close_matches(name, list(islice(short, MOST_NAMES)), n=1, cutoff=0.5)
-    return f"Did you mean '{close[0]}'?" if close else ""
+    short = list(islice((one for one in known if len(one) <= MOST_CHARACTERS), MOST_NAMES))
+    folded = {one.lower(): one for one in reversed(short)}
+    close = difflib.get_close_matches(name.lower(), folded, n=1, cutoff=0.5)
+    return f"Did you mean '{folded[close[0]]}'?" if close else ""
 
 
 def quoted(name: str) -> str:

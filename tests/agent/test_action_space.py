@@ -166,6 +166,38 @@ def test_continuous_refuses_bad_limits(low, high, words):
     assert words in str(error.value)
 
 
+DEGREES = {"low": -30, "high": 30}
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "words"),
+    [
+        (DiscreteActionSpace, 5, 'actions is 5; allowed is a list of {"steering_angle": degrees, "speed": m/s}.'),
+        (DiscreteActionSpace, [{"speed": 1}], "actions is [{'speed': 1}]; allowed is a list"),
+        (DiscreteActionSpace, [{"steering_angle": "left", "speed": 1}] * 2, "'left'"),
+        (DiscreteActionSpace, [(30, 1), (-30, 1)], "actions is [(30, 1), (-30, 1)]; allowed"),
+        (ContinuousActionSpace, {}, 'limits is {}; allowed is {"low": ..., "high": ...} for "steering_angle" in'),
+        (ContinuousActionSpace, {"steering_angle": DEGREES, "speed": {"low": 1}}, "'speed': {'low': 1}}; allowed is"),
+        (ContinuousActionSpace, {"steering_angle": DEGREES, "speed": 4}, "'speed': 4}; allowed is"),
+        (ContinuousActionSpace, {"steering_angle": DEGREES, "speed": {"low": 1, "high": None}}, "'high': None}}"),
+    ],
+)
+def test_what_is_nothing_of_aws_says_what_is(kind, given, words):
+    with pytest.raises(ConfigError) as error:
+        kind.from_aws(given)
+    assert words in str(error.value)
+
+
+def test_degrees_where_radians_are_wanted_are_guessed():
+    for make in (lambda: DiscreteActionSpace([(30, 1), (-30, 1)]), lambda: ContinuousActionSpace([-30, 1], [30, 2])):
+        with pytest.raises(ConfigError, match=r"steering_angle\S* is -?1718\.87") as error:
+            make()
+        assert error.value.hint == "Angles are in radians here; from_aws takes degrees."
+    with pytest.raises(ConfigError, match="is 51") as error:
+        DiscreteActionSpace([(0.9, 1), (0.0, 1)])
+    assert not error.value.hint
+
+
 def test_presets_exist_and_a_misspelt_one_is_guessed():
     assert all(action_space(name).size >= 2 for name in PRESETS)
     assert action_space("fast").table[:, 1].max() == 4.0

@@ -112,6 +112,7 @@ def test_names_may_have_capital_letters():
         ("beta_entropy", -0.1, "0 to 100"),
         ("beta_entropy", 101, "0 to 100"),
         ("discount_factor", 1.01, "0 to 1"),
+        ("loss_type", "Mean Square Error", "'huber' or 'mean squared error' (Did you mean 'mean squared error'?)"),
         ("loss_type", "hubert", "'huber' or 'mean squared error' (Did you mean 'huber'?)"),
         ("num_episodes_between_training", 0, "1 to 10000"),
         ("num_episodes_between_training", 10_001, "1 to 10000"),

@@ -263,17 +263,26 @@ def test_indices_that_count_from_1_are_told_once():
             {"action_space": {**LIMITS, "speed": {"low": 1, "high": 9}}, "action_space_type": "continuous"},
             "action_space.speed.high is 9; allowed is 0.1 to 4 m/s",
         ),
-        ({"action_space": LIMITS, "action_space_type": "discrete"}, "allowed is a list of 2 to 30 actions"),
+        (
+            {"action_space": LIMITS, "action_space_type": "discrete"},
+            "action_space is an object, and action_space_type 'discrete'; allowed is a list of 2 to 30 actions, or "
+            "'continuous'.",
+        ),
+        ({"action_space_type": " Discreet"}, "action_space_type is ' Discreet'; allowed is 'discrete' or"),
         ({"action_space_type": "continuous"}, "allowed is an object with steering_angle and speed"),
         ({"action_space_type": "discreet"}, "'discrete' or 'continuous' (Did you mean 'discrete'?)"),
         (
             {"sensor": "FRONT_FACING_CAMERA"},
-            "sensor is 'FRONT_FACING_CAMERA'; allowed is a list of sensor names",
+            "sensor is 'FRONT_FACING_CAMERA'; allowed is a list of sensor names, such as [\"FRONT_FACING_CAMERA\"]",
         ),
         ({"sensor": []}, "sensor has 0 cameras"),
         ({"sensor": [*CAMERA, "LEFT_CAMERA"]}, "sensor has 2 cameras"),
         ({"sensor": [*CAMERA, "LIDAR", "SECTOR_LIDAR"]}, "sensor has 2 LIDARs"),
         ({"sensor": ["FRONT_CAMERA"]}, "sensor is 'FRONT_CAMERA'; allowed are"),
+        (
+            {"neural_network": "deep_convolutional_network"},
+            "PERCEPTION (Did you mean 'DEEP_CONVOLUTIONAL_NETWORK'?)",
+        ),
         ({"neural_network": "DEEP"}, "neural_network is 'DEEP'; allowed is DEEP_CONVOLUTIONAL_NETWORK_SHALLOW"),
         ({"training_algorithm": "ppo"}, "training_algorithm is 'ppo'; allowed is 'clipped_ppo' or 'sac'"),
         ({"training_algorithm": "sac"}, "'sac' needs action_space_type 'continuous'"),
@@ -291,12 +300,22 @@ def test_wrong_field_names_itself_its_value_and_what_is_allowed(change, words):
     assert str(error.value).startswith("m.json: ")
 
 
+@pytest.mark.parametrize("document", [5, [], None, "{}"])
+def test_what_is_no_object_has_no_fields(document):
+    with pytest.raises(ConfigError, match=r"^m.json is .*; allowed is an object of named fields"):
+        ModelMetadata.from_dict(document, name="m.json")
+
+
 def test_default_is_what_a_new_model_gets():
     metadata = ModelMetadata()
     assert metadata.action_space == action_space("default")
     assert ModelMetadata.from_dict(metadata.to_dict()) == metadata
     with pytest.raises(ConfigError, match="version is '9'"):
         ModelMetadata(version="9")
+    with pytest.raises(
+        ConfigError, match=r"lidar is \{'num_sectors': 8\}; use a racecraft\.agent\.LidarConfig, or None"
+    ):
+        ModelMetadata(lidar={"num_sectors": 8})
 
 
 @pytest.mark.parametrize(

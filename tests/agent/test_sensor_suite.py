@@ -64,6 +64,19 @@ def test_a_simulation_without_the_sensors_is_refused() -> None:
         FRONT_CAMERA.read(Simulation(load_track("oval"), num_envs=1, camera=None))
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"names": "FRONT_FACING_CAMERA"}, "names is 'FRONT_FACING_CAMERA'; use a list of AWS's sensor names"),
+        ({"names": 5}, "names is 5; use a list"),
+        ({"lidar": 5}, "lidar is 5; use a racecraft.agent.LidarConfig, or None"),
+    ],
+)
+def test_what_is_no_list_or_configuration_is_refused(given: dict[str, object], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        SensorSuite(**given)  # type: ignore[arg-type]
+
+
 def test_names_that_do_not_go_together_are_refused() -> None:
     with pytest.raises(ConfigError, match="0 cameras"):
         SensorSuite(("LIDAR",))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from racecraft.checks import check_choice, require
+from racecraft.checks import check_choice, is_number, require, shown
 from racecraft.errors import ConfigError, NonFiniteAction, ShapeError
 
 if TYPE_CHECKING:
@@ -83,7 +83,11 @@ class DiscreteActionSpace:
     @classmethod
     def from_aws(cls, actions: Sequence[Mapping[str, Any]]) -> DiscreteActionSpace:
         """From AWS's list of ``{"steering_angle": degrees, "speed": m/s}``; other keys are `extra`."""
-        table = [(math.radians(float(a["steering_angle"])), float(a["speed"])) for a in actions]
+        try:
+            table = [(math.radians(float(a["steering_angle"])), float(a["speed"])) for a in actions]
+        except (LookupError, TypeError, ValueError) as error:
+            allowed = 'a list of {"steering_angle": degrees, "speed": m/s}'
+            raise ConfigError(f"actions is {shown(actions)}; allowed is {allowed}.") from error
         known = ("steering_angle", "speed", "index")
         return cls(
             np.array(table, dtype=np.float64).reshape(-1, 2),
@@ -190,16 +194,16 @@ class ContinuousActionSpace:
     @classmethod
     def from_aws(cls, limits: Mapping[str, Mapping[str, Any]]) -> ContinuousActionSpace:
         """From AWS's ``{"steering_angle": {"low", "high"} in °, "speed": {"low", "high"}}``; others are `extra`."""
-        steering, speed = limits["steering_angle"], limits["speed"]
+        names = ("steering_angle", "speed")
+        try:
+            low, high = ([float(limits[name][end]) for name in names] for end in ("low", "high"))
+        except (LookupError, TypeError, ValueError) as error:
+            allowed = '{"low": ..., "high": ...} for "steering_angle" in degrees and "speed" in m/s'
+            raise ConfigError(f"limits is {shown(limits)}; allowed is {allowed}.") from error
         inside = {
-            name: {key: value for key, value in limits[name].items() if key not in ("low", "high")}
-            for name in ("steering_angle", "speed")
+            name: {key: value for key, value in limits[name].items() if key not in ("low", "high")} for name in names
         }
-        return cls(
-            [math.radians(float(steering["low"])), float(speed["low"])],
-            [math.radians(float(steering["high"])), float(speed["high"])],
-            extra={**limits, **inside},
-        )
+        return cls([math.radians(low[0]), low[1]], [math.radians(high[0]), high[1]], extra={**limits, **inside})
 
     def to_aws(self) -> dict[str, dict[str, float]]:
         """AWS's limits, steering in degrees."""
@@ -304,8 +308,11 @@ def _array(actions: ArrayLike, *, dtype: type | None = None) -> NDArray[Any]:
 
 
 def _check(name: str, value: float, low: float, high: float, unit: str) -> None:
-    if not low <= value <= high:
-        raise ConfigError(f"{name} is {value:g}; allowed is {low:g} to {high:g} {unit}.")
+    if not is_number(value, is_plain=False) or not low <= value <= high:
+        given = f"{value:g}" if is_number(value, is_plain=False) else shown(value)
+        is_slip = unit == "degrees" and is_number(value, is_plain=False) and abs(value) > 100.0
+        hint = "Angles are in radians here; from_aws takes degrees." if is_slip else ""
+        raise ConfigError(f"{name} is {given}; allowed is {low:g} to {high:g} {unit}.", hint=hint)
 
 
 def _degrees(radians: float) -> float:

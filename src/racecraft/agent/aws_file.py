@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError, did_you_mean
 
 MAX_SHOWN = 60  # characters of a wrong value in a message
@@ -73,10 +74,11 @@ def validate(model: type[_Model], document: Mapping[str, Any], *, name: str) -> 
     Raises:
         ConfigError: Names each field at fault, its value, and what is allowed.
     """
+    check_type(name, document, Mapping, "allowed is an object of named fields")
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        faults = [_sentence(model, fault) for fault in error.errors(include_url=False)]
+        faults = [_sentence(model, fault, document) for fault in error.errors(include_url=False)]
         more = f" (and {len(faults) - 3} more)" if len(faults) > 3 else ""
         message = "; ".join(dict.fromkeys(faults[:3]))
         raise ConfigError(f"{name}: {message}{more}.") from error
@@ -119,19 +121,29 @@ def show(value: object) -> str:
     return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
 
 
-def _sentence(model: type[BaseModel], fault: Any) -> str:
+def _sentence(model: type[BaseModel], fault: Any, document: Any) -> str:
     location: tuple[str | int, ...] = fault["loc"]
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     allowed = _description(model, location)
     if fault["type"] == "missing":
         return f"{where} is missing{f'; allowed is {allowed}' if allowed else ''}"
-    value = show(fault["input"])
+    value = show(_written(document, location, fault["input"]))
     suggestion = ""
     if fault["type"] == "literal_error":
         choices = re.findall("'([^']+)'", fault["ctx"]["expected"])
         allowed = allowed or ", ".join(choices)
         suggestion = did_you_mean(fault["input"], choices) if isinstance(fault["input"], str) else ""
     return f"{where} is {value}; allowed is {allowed or fault['msg']}" + (f" ({suggestion})" if suggestion else "")
+
+
+def _written(document: Any, location: tuple[str | int, ...], read: object) -> object:
+    """A value as its file has it, be it read in small letters; where it is not found, as it was read."""
+    try:
+        for part in location:
+            document = document[part]
+    except (LookupError, TypeError):
+        return read
+    return document
 
 
 def _description(model: type[BaseModel], location: tuple[str | int, ...]) -> str:

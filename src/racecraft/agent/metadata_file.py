@@ -93,7 +93,7 @@ class _Lidar(AwsModel):
 class _Common(AwsModel):
     """Everything but the action space; it takes one of two forms, and so the file is one of two models."""
 
-    sensor: list[str] = Field(["observation"], description="a list of sensor names")
+    sensor: list[str] = Field(["observation"], description='a list of sensor names, such as ["FRONT_FACING_CAMERA"]')
     neural_network: NeuralNetwork = Field(NEURAL_NETWORKS[0], description=", ".join(NEURAL_NETWORKS))
     training_algorithm: Literal["clipped_ppo", "sac"] = Field("clipped_ppo", description="'clipped_ppo' or 'sac'")
     action_space_type: Literal["discrete", "continuous"] = Field("discrete", description="'discrete' or 'continuous'")
@@ -152,6 +152,11 @@ def read_metadata(document: Mapping[str, Any], *, name: str, make: Callable[...,
             if space.low[1] < DROA_MIN_SPEED:
                 notes.append(f"{name}: DeepRacer on AWS refuses a continuous speed below {DROA_MIN_SPEED} m/s.")
         else:
+            if isinstance(document.get("action_space"), dict):
+                raise ConfigError(
+                    f"action_space is an object, and action_space_type {common.action_space_type!r}; allowed is a list "
+                    f"of {MIN_ACTIONS} to {MAX_ACTIONS} actions, or 'continuous'."
+                )
             file = validate(_DiscreteFile, document, name=name)
             notes += _action_notes(file.action_space, version, name=name)
             space = DiscreteActionSpace.from_aws([action.model_dump() for action in file.action_space])

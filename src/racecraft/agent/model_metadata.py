@@ -47,6 +47,7 @@ class ModelMetadata:
         kinds = (DiscreteActionSpace, ContinuousActionSpace)
         check_type("action_space", self.action_space, kinds, "use racecraft.action_space(NAME), or one of your own")
         check_type("sensors", self.sensors, (list, tuple), "use a list of AWS's sensor names")
+        check_type("lidar", self.lidar, (LidarConfig, type(None)), "use a racecraft.agent.LidarConfig, or None")
         object.__setattr__(self, "sensors", check_sensors(self.sensors))
         for name, value, allowed in (
             ("neural_network", self.neural_network, NEURAL_NETWORKS),

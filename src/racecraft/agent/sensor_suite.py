@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from racecraft.agent.lidar import observe_lidar
 from racecraft.agent.sensors import CAMERAS, LIDARS, LidarConfig, camera_of, check_sensors, observation_shape
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class SensorSuite:
     """Sizes of ``DISCRETIZED_SECTOR_LIDAR``; the default ones when None."""
 
     def __post_init__(self) -> None:
+        check_type("names", self.names, (list, tuple), "use a list of AWS's sensor names")
+        check_type("lidar", self.lidar, (LidarConfig, type(None)), "use a racecraft.agent.LidarConfig, or None")
         object.__setattr__(self, "names", check_sensors(self.names))
 
     @property
