@@ -71,6 +71,16 @@ def test_bad_names_are_refused(tmp_path, name):
     assert not (tmp_path / "runs").exists()
 
 
+def test_what_is_no_name_or_place_is_told_so(tmp_path):
+    for name in (5, b"a", tmp_path):
+        with pytest.raises(ConfigError, match=r"name is .*; use a text\."):
+            RunFolder.create(tmp_path / "runs", name=name)
+    for root in (5, None, b"runs"):
+        with pytest.raises(ConfigError, match=r"root is .*; use a folder's path\."):
+            RunFolder.create(root)
+    assert not (tmp_path / "runs").exists()
+
+
 @given(st.text(max_size=100))
 def test_sanitized_names_are_allowed(text):
     name = sanitize_name(text)

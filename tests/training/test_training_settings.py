@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
@@ -243,6 +244,26 @@ def test_ppo_can_be_given_whole_but_not_beside_hyperparameters() -> None:
     assert make_settings(metadata=DISCRETE, ppo=ppo, num_envs=4).ppo.learning_rate == 0.0
     with pytest.raises(ConfigError, match="one of them"):
         make_settings(metadata=DISCRETE, ppo=ppo, hyperparameters=Hyperparameters())
+    for wrong in ({}, {"learning_rate": 1e-3}, 5):
+        with pytest.raises(ConfigError, match=r"ppo is .*; use racecraft\.learn\.PPOConfig\(\.\.\.\)\."):
+            train("oval", ppo=wrong)
+    assert make_plan(ppo=None).settings == make_plan().settings
+
+
+def test_a_seed_of_numpy_s_is_a_number_that_json_knows() -> None:
+    seed = make_plan(seed=np.int64(7)).settings.seed
+    assert (seed, type(seed)) == (7, int)
+    for wrong in (np.float64(7), True, "7"):
+        with pytest.raises(ConfigError, match=r"seed is .*; allowed is a whole number from 0"):
+            make_plan(seed=wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("given", "says"), [({"name": 5}, "name is 5; use a text"), ({"root": 5}, "root is 5; use a folder's path")]
+)
+def test_names_are_texts_and_places_are_paths(given: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        train("oval", **given)
 
 
 def test_an_unknown_setting_is_refused_with_the_nearest() -> None:

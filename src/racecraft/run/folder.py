@@ -92,7 +92,9 @@ class RunFolder:
 
         Raises:
             RunError: The name is not allowed or taken, or the folder cannot be made.
+            ConfigError: The name is no text, or the root no path.
         """
+        check_type("root", root, (str, os.PathLike), "use a folder's path")
         root = Path(root)
         if name is not None:
             names = [checked_name(name)]
@@ -409,7 +411,9 @@ def checked_name(name: str) -> str:
 
     Raises:
         RunError: It may not; the hint has one that is near.
+        ConfigError: It is no text.
     """
+    check_type("name", name, str, "use a text")
     if len(name) > MAX_NAME or not _NAME.fullmatch(name) or _RESERVED.fullmatch(name) or name.endswith("."):
         raise RunError(
             f"Name {quoted(name)} is not allowed: 1 to {MAX_NAME} letters, digits, dots, hyphens and underscores.",

@@ -7,7 +7,11 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
+from racecraft.checks import check_type
+from racecraft.learn import PPOConfig
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
 from racecraft.sim.objects import NO_OBJECTS
@@ -81,6 +85,9 @@ def make_plan(
     Raises:
         RacecraftError: An input is wrong.
     """
+    if isinstance(seed, np.integer):
+        seed = int(seed)  # JSON, in which a run keeps it, does not know NumPy's
+    check_type("ppo", settings.get("ppo"), (PPOConfig, type(None)), "use racecraft.learn.PPOConfig(...)")
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
     before = None if parent is None else read_settings(parent.folder)
