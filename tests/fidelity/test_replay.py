@@ -371,8 +371,9 @@ def test_a_table_that_a_spreadsheet_separated_otherwise_is_told_so(separator, ha
 def test_files_that_cannot_be_read(tmp_path, lines):
     with pytest.raises(RunError, match="cannot be read"):
         replay(tmp_path / "none.csv", track="oval")
-    with pytest.raises(RunError, match="cannot be read"):
+    with pytest.raises(RunError, match="is a folder; logs are files") as error:
         replay(tmp_path, track="oval")
+    assert error.value.hint == f"Name those in it: {tmp_path}/*.csv"
     whole = write(tmp_path / "a.csv.gz", lines).read_bytes()
     (tmp_path / "half.csv.gz").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(RunError, match=r"half\.csv\.gz cannot be read"):

@@ -9,7 +9,7 @@ from pathlib import Path
 import models
 import pytest
 
-from racecraft import cli
+from racecraft import cli, train
 from racecraft.run import RunFolder
 
 
@@ -48,6 +48,27 @@ def test_it_says_what_it_did_and_how_to_go_on(
     assert RunFolder.open(document["run"]).name in document["next"]
     assert document["unknown"] == {"DR_WORLD_NAM": "Did you mean 'DR_WORLD_NAME'?"}
     assert any("its critic begins anew" in note for note in document["notes"])
+
+
+def test_a_run_of_racecraft_keeps_its_files_where_they_were(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ours = train("oval", until="64 steps", name="ours", num_threads=1).run
+    _, out = racecraft(capsys, monkeypatch, "import", str(ours), "--name", "again")
+    assert "metrics, sim-traces and logs  where they were in it" in out
+    assert "was left out" not in out  # ip/hyperparameters.json, which is for AWS's tools
+    _, out = racecraft(capsys, monkeypatch, "import", str(ours), "--json")
+    document = json.loads(out)
+    assert document["kept_in"] == ""
+    for name in document["kept"]:
+        assert (Path(document["run"]) / name).read_bytes() == (ours / name).read_bytes()
+    folder = models.as_folder(models.DRFC, tmp_path / "drfc")
+    _, out = racecraft(capsys, monkeypatch, "import", str(folder), "--json")
+    document = json.loads(out)
+    kept = [Path(document["run"]) / document["kept_in"] / name for name in document["kept"]]
+    assert len(kept) == 2
+    assert all(path.is_file() for path in kept)
 
 
 def test_a_refusal_is_one_json_object(

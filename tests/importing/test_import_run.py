@@ -299,4 +299,4 @@ def test_a_taken_name_and_a_failure_half_way_leave_the_other_run_alone(
 def test_a_report_is_plain_json(tmp_path: Path) -> None:
     found: ImportedRun = import_run(models.as_folder(models.DRFC, tmp_path / "d"), name="x")
     document = json.loads(json.dumps(found.to_dict(), allow_nan=False))
-    assert document.keys() == {"run", "kind", "track", "used", "unused", "unknown", "kept", "notes", "next"}
+    assert document.keys() == {"run", "kind", "track", "used", "unused", "unknown", "kept", "kept_in", "notes", "next"}

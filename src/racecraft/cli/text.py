@@ -101,7 +101,7 @@ def say_imported(result: ImportedRun) -> None:
             console,
             ("  = ", "bold green"),
             f"{len(result.kept)} metrics, sim-traces and logs  ",
-            ("in original/", "dim"),
+            (f"in {result.kept_in}/" if result.kept_in else "where they were in it", "dim"),
         )
     for note in result.notes:
         _say(console, ("note: ", "bold"), note)

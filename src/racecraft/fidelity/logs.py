@@ -24,7 +24,7 @@ from typing import BinaryIO, Final, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.errors import RunError
+from racecraft.errors import RunError, typed
 from racecraft.json_file import open_regular
 from racecraft.run.simtrace import COLUMNS, READABLE
 from racecraft.sim.simulation import CONTROL_DT
@@ -128,6 +128,8 @@ def read_logs(paths: Iterable[str | Path], faults: Faults) -> Iterator[Log]:
 def _read_file(path: Path, source: str, faults: Faults) -> Iterator[Log]:
     rows: list[tuple[int, Sequence[str]]] = []
     good, broken_before = 0, faults.count
+    if path.is_dir():
+        raise RunError(f"{path} is a folder; logs are files.", hint=f"Name those in it: {typed(path)}/*.csv")
     try:
         with open_regular(path) as raw, _decoded(raw) as file:
             for log in _batches(source, file, rows, faults):

@@ -99,10 +99,11 @@ class _Model:
 
     def note_elsewhere(self, name: str) -> None:
         """Say where a settings file lies that is none of this model's."""
+        known = [self.root + place for place in PLACES[name]]
         found = [file for file in self.source.files if file.endswith(f"/{name}") and not is_of_others(file)]
         self.notes += [
             f"{file} was left out: the model's own would lie in {self.root or 'the outermost folder'}."
-            for file in sorted(found)[:1]
+            for file in sorted(set(found).difference(known))[:1]
         ]
 
 
@@ -194,7 +195,7 @@ def import_run(
                 model.used.update(own.restore(folder, model.notes))
             if model.weights is not None and weights:
                 save_weights(folder, weights, spec, _origin(model, model.weights, has_critic=not spec.state_size))
-            report = _report(model, folder, tracks[0], history)
+            report = _report(model, folder, tracks[0], history, kept_in=ORIGINAL if own is None else "")
             if rules is not None:
                 write_json(folder.race_rules, rules.to_dict())
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
@@ -472,7 +473,7 @@ def _history_files(model: _Model) -> list[SourceFile]:
     return [file for name, file in model.source.files.items() if name.startswith(root) and name != reward]
 
 
-def _report(model: _Model, folder: RunFolder, track: Track, history: History) -> ImportedRun:
+def _report(model: _Model, folder: RunFolder, track: Track, history: History, *, kept_in: str) -> ImportedRun:
     read = () if model.weights is None else model.weights.paths
     left = [file for file in _history_files(model) if file.name not in read]
     model.unused.update(unused_files(left, _history_root(model)))
@@ -487,5 +488,6 @@ def _report(model: _Model, folder: RunFolder, track: Track, history: History) ->
         unused=model.unused,
         unknown=model.unknown,
         kept=history.files,
+        kept_in=kept_in,
         notes=model.notes,
     )

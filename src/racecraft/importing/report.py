@@ -37,7 +37,9 @@ class ImportedRun:
     unknown: dict[str, str] = field(default_factory=dict)
     """Settings that nobody here knows, and a suggestion or an empty string."""
     kept: list[str] = field(default_factory=list)
-    """Metrics, sim-traces and logs of the original, below ``original/``."""
+    """Metrics, sim-traces and logs of the original, below `kept_in`."""
+    kept_in: str = "original"
+    """Folder of the run; empty where they lie in it as they did, in a run that was Racecraft's before."""
     notes: list[str] = field(default_factory=list)
     """Sentences for the user."""
 
@@ -56,6 +58,7 @@ class ImportedRun:
             "unused": self.unused,
             "unknown": self.unknown,
             "kept": self.kept,
+            "kept_in": self.kept_in,
             "notes": self.notes,
             "next": self.next_command,
         }
