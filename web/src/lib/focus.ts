@@ -10,3 +10,8 @@ export async function goOn(find: () => HTMLElement | null | undefined = () => nu
   if (there?.isConnected) there.focus();
   else document.getElementById("main")?.focus({ preventScroll: true });
 }
+
+/** For what was just asked for: `autofocus` alone leaves the keyboard where it is if what had asked is still there. */
+export function focused(node: HTMLElement): void {
+  node.focus();
+}
