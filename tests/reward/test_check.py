@@ -132,6 +132,11 @@ ERRORS = [
 ]
 
 
+def test_a_question_of_python_s_ends_as_one():
+    (problem,) = check_reward(body("print 'hello'", RETURN))
+    assert str(problem).endswith("Did you mean print(...)?")
+
+
 @pytest.mark.parametrize(("source", "line", "column", "text"), ERRORS, ids=range(len(ERRORS)))
 def test_errors_have_a_place(source, line, column, text):
     errors = [problem for problem in check_reward(source) if problem.severity == "error"]

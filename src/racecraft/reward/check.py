@@ -109,7 +109,8 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
             compile(tree, FILENAME, "exec")  # finds more: a 'return' outside of a function, a 'nonlocal' without one
         except SyntaxError as error:
             tree = None
-            message = f"{type(error).__name__}: {error.msg}."
+            is_question = error.msg.endswith("?")  # Did you mean print(...)?
+            message = f"{type(error).__name__}: {error.msg}" + ("" if is_question else ".")
             findings.append(Problem(max(error.lineno or 1, 1), max(error.offset or 1, 1), message))
         except ValueError as error:  # a NUL, or half of a surrogate pair
             tree = None
