@@ -16,7 +16,7 @@ import pytest
 from gymnasium import spaces
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from racecraft.classic import ALGORITHMS, RECIPES, Progress, job, learn, ppo, resume
+from racecraft.classic import ALGORITHMS, RECIPES, Progress, default_algorithm, job, learn, ppo, recall, resume
 from racecraft.classic.evaluation import play
 from racecraft.classic.saved import load
 from racecraft.classic.settings import Settings
@@ -344,6 +344,28 @@ def test_an_algorithm_that_does_not_fit_names_those_that_do(environment: str, al
 def test_settings_that_are_not_allowed(settings: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         learn("CartPole-v1", "dqn", settings=settings)
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"environment": 5}, "environment is 5; use an id of Gymnasium, such as 'CartPole-v1'"),
+        ({"settings": 5}, "settings is 5; allowed is a dict of names and values"),
+        ({"settings": {5: 1}}, "settings is {5: 1}; allowed is a dict of names and values"),
+        ({"make": ["is_slippery"]}, r"make is \['is_slippery'\]; allowed is a dict of names and values"),
+    ],
+)
+def test_arguments_of_another_kind_are_told(given: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        learn(**{"environment": "CartPole-v1", "algorithm": "dqn", **given})
+
+
+def test_what_is_no_run_to_go_on_with_is_told() -> None:
+    for ask in (resume, recall):
+        with pytest.raises(ConfigError, match=r"run is 5; use the path of a run's folder"):
+            ask(5)  # type: ignore[operator]
+    with pytest.raises(ConfigError, match="environment is None; use an id of Gymnasium"):
+        default_algorithm(None)  # type: ignore[arg-type]
 
 
 def test_cuts_are_no_setting_that_one_could_have_meant() -> None:

@@ -64,6 +64,19 @@ def test_pictures_of_every_kind_and_size(tmp_path: Path, perceiver: Perceiver) -
         assert image.size == (640, 480)
 
 
+def test_one_source_needs_no_list_and_texts_are_paths(tmp_path: Path, perceiver: Perceiver) -> None:
+    road().save(tmp_path / "a.png")
+    told = perceive([tmp_path / "a.png"], perceiver=perceiver)
+    assert perceive(tmp_path / "a.png", perceiver=perceiver) == told
+    assert perceive(str(tmp_path / "a.png"), output=str(tmp_path / "seen"), perceiver=perceiver) == told
+    assert [path.name for path in (tmp_path / "seen").iterdir()] == ["00000-a.png"]
+    for sources in (5, None, [5], {"a.png"}):
+        with pytest.raises(ConfigError, match=r"sources is .*; allowed is a path, or a list of several"):
+            perceive(sources, perceiver=perceiver)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match="output is 5; use a path"):
+        perceive(tmp_path, output=5, perceiver=perceiver)  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("name", ["a#1", "a#2.b", "50%", "with a space", "%d"])
 def test_painted_pictures_keep_the_names_of_their_files(tmp_path: Path, perceiver: Perceiver, name: str) -> None:
     road().save(tmp_path / f"{name}.png")

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_whole
+from racecraft.checks import check_whole, require
 from racecraft.classic.algorithms import check_fit, find_algorithm
 from racecraft.classic.blas import one_blas_thread
 from racecraft.classic.evaluation import play
@@ -141,6 +141,9 @@ def learn(
         TrainingError: The numbers have left all bounds.
     """
     check_whole("seed", seed, 0, 2**63 - 1)
+    for what, given in (("settings", settings), ("make", make)):
+        is_named = isinstance(given, Mapping) and all(isinstance(key, str) for key in given)
+        require(what, given, given is None or is_named, "a dict of names and values")
     recipe = find_recipe(environment, algorithm)
     goal = Goal.parse(until) if until else Goal(mean_return=recipe.goal)
     chosen = recipe.settings.changed(settings or {})
@@ -175,8 +178,8 @@ def resume(run: str | Path, *, until: str = "", on_progress: Callable[[Progress]
         RunError: The folder holds nothing of the kind.
         ConfigError: Its environment cannot be made.
     """
+    lesson, arrays, steps = load(run)
     folder = Path(run)
-    lesson, arrays, steps = load(folder)
     goal = Goal.parse(until) if until else Goal()
     if goal.steps:
         lesson = replace(lesson, settings=replace(lesson.settings, steps=goal.steps))

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import gymnasium
 
+from racecraft.checks import check_type
 from racecraft.classic.a2c import ActorCriticSettings
 from racecraft.classic.a3c import A3CSettings
 from racecraft.classic.algorithms import ALGORITHMS, find_algorithm
@@ -163,8 +164,9 @@ def find_recipe(environment: str, algorithm: str) -> Recipe:
     """What is known to work; for other pairs the algorithm's own settings, and Gymnasium's threshold for a goal.
 
     Raises:
-        ConfigError: There is no such algorithm.
+        ConfigError: There is no such algorithm, or the environment is no id.
     """
+    check_type("environment", environment, str, "use an id of Gymnasium, such as 'CartPole-v1'")
     made = find_algorithm(algorithm)
     name = environment.rpartition(":")[2]
     is_atari = name.startswith("ALE/")
@@ -191,8 +193,9 @@ def default_algorithm(environment: str) -> str:
     """The first that is tuned for an environment.
 
     Raises:
-        ConfigError: None is.
+        ConfigError: None is, or the environment is no id.
     """
+    check_type("environment", environment, str, "use an id of Gymnasium, such as 'CartPole-v1'")
     name = environment.rpartition(":")[2]
     for tuned, algorithm in RECIPES:
         if tuned == name:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,7 +79,9 @@ def load(folder: str | Path) -> tuple[Lesson, dict[str, NDArray[Any]], int]:
 
     Raises:
         RunError: The folder holds nothing that was learned, or what is not understood.
+        ConfigError: It is no path.
     """
+    check_type("run", folder, (str, PathLike), "use the path of a run's folder, such as 'runs/NAME'")
     from safetensors import SafetensorError
     from safetensors.numpy import load_file
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type, require
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.encoding import write_video
 from racecraft.perceiving.painting import paint
@@ -25,9 +27,9 @@ UNKNOWN: Final = (np.nan, np.nan)
 
 
 def perceive(
-    sources: Sequence[str | Path],
+    sources: str | Path | Sequence[str | Path],
     *,
-    output: Path | None = None,
+    output: str | Path | None = None,
     perceiver: Perceiver | None = None,
     num_threads: int = 0,
 ) -> list[dict[str, Any]]:
@@ -36,7 +38,7 @@ def perceive(
     Of a replay or run it is known, too, what the car was told.
 
     Args:
-        sources: Files, folders, a video, a replay or a run.
+        sources: Files, folders, a video, a replay or a run; or one of them alone.
         output: Where to paint what is believed: of a single video, replay or run a video ending in ``.mp4``, otherwise
             a folder of PNGs; None paints nothing.
         perceiver: Who looks; by default with the weights that the package brings along.
@@ -49,6 +51,12 @@ def perceive(
         ConfigError: A source is not something to look at, or no film and to be painted as one.
         RunError: The painted pictures cannot be written.
     """
+    sources = [sources] if isinstance(sources, str | PathLike) else sources
+    is_list = isinstance(sources, Sequence) and all(isinstance(source, str | PathLike) for source in sources)
+    require("sources", sources, is_list, "a path, or a list of several")
+    if output is not None:
+        check_type("output", output, (str, PathLike), "use a path")
+        output = Path(output)
     looker = perceiver or Perceiver(num_threads=num_threads)
     told: list[dict[str, Any]] = []
     if output is None:
