@@ -11,7 +11,10 @@ from sqlalchemy.orm import Session
 
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Finalist, Group, Job, Race, Submission, User, now
+from racecraft.serve.submissions.finalists import board_of
+from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.season import PUBLIC_RACES, SeasonStanding, read_season
+from racecraft.sim.vehicle import load_vehicle
 
 NAMES = tuple(f"Racer {number:02}" for number in range(13))
 
@@ -90,6 +93,45 @@ def test_a_final_gives_the_points_of_its_qualifying(session: Session) -> None:
     final.deleted = now()
     session.flush()
     assert told(read_season(session, 1)) == [(0, 25, 1, 1), (1, 18, 1, 0), (2, 15, 1, 0)], "it leads nowhere any more"
+
+
+def final_of_two(session: Session) -> Race:
+    """Racer 1 has won it and racer 0 lost; it follows a race that they were in."""
+    qualifying = race_of(session, {0: 9000, 1: 9900})
+    document = {"final": {"form": "bracket", "best": 2, "qualifying": "c"}}
+    final = race_of(session, {}, after_id=qualifying.id, document=document)
+    entered = {one.user_id - 10: one.id for one in session.query(Submission).filter_by(race_id=qualifying.id)}
+    for seed, (racer, place) in enumerate(((0, 2), (1, 1)), start=1):
+        session.add(Finalist(race_id=final.id, seed=seed, submission_id=entered[racer], place=place))
+    session.flush()
+    return final
+
+
+def test_who_has_deleted_their_account_is_in_no_season_also_after_a_final(session: Session) -> None:
+    final = final_of_two(session)
+    winner = session.get_one(User, 11)
+    winner.name, winner.handle, winner.deleted = "(gone 11)", None, now()
+    session.flush()
+    assert told(read_season(session, 1)) == [(0, 18, 1, 0)]
+    rows = board_of(session, final, user_id=None, top=10).rows
+    assert [(row.name, row.place) for row in rows] == [("(gone 11)", 1), ("Racer 00", 2)], "as it was driven"
+
+
+def test_a_final_that_is_driven_once_more_says_that_its_board_is_not_the_last(database: Database) -> None:
+    with database.transaction() as session:
+        session.add_all(User(id=10 + number, name=NAMES[number], handle=NAMES[number]) for number in range(2))
+        session.add_all(
+            [Group(id=1, title="ours"), Job(id="j", kind="judge", run=""), Job(id="f", kind="final", run="")]
+        )
+        session.flush()
+        final = final_of_two(session)
+        final.document = {**final.document, "vehicle": vars(load_vehicle("v5"))}
+        final.visibility, final.final_job_id, number = "public", "f", final.id
+    league = League(database, lambda _: pytest.fail("nobody asks for a track"))
+    for state, running in (("queued", 1), ("running", 1), ("done", 0), ("failed", 0)):
+        with database.transaction() as session:
+            session.get_one(Job, "f").state = state
+        assert league.published(number, user_id=None)["running"] == running, state
 
 
 def test_of_equals_who_has_won_more_leads_and_then_who_came_first(session: Session) -> None:

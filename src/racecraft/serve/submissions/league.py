@@ -206,6 +206,7 @@ class League:
         """
         with self._database.one_moment() as connection, Session(connection) as session:
             found, race, board, running = _board(session, race_id, user_id=user_id, top=NONE)
+            running += _is_driven_again(session, found)
             is_over = race.state == "closed"
             final = {"final": published_final(session, found)} if is_over and race.form != "alone" else {}
         announced = replace(announcement_of(found), secret=race.secret).to_dict()
@@ -242,6 +243,12 @@ def _board(session: Session, race_id: int, *, user_id: int | None, top: int) -> 
     waiting = sa.select(sa.func.count(Submission.id)).join(Job, Job.id == Submission.job_id)
     waiting = waiting.where(Submission.race_id == race_id, Job.state.in_(("queued", "running")))
     return race, _info(race, title, part), board, session.scalar(waiting) or 0
+
+
+def _is_driven_again(session: Session, race: Race) -> bool:
+    """Whether a final that is over is being driven once more, so that its board is not the last one."""
+    job = None if race.final_job_id is None else session.get_one(Job, race.final_job_id)
+    return job is not None and job.state in ("queued", "running") and state_of(race) == "closed"
 
 
 def _info(race: Race, group_title: str, part: Part) -> LeagueRace:

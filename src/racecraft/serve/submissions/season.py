@@ -9,7 +9,7 @@ import sqlalchemy as sa
 from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.races.races import state_of
-from racecraft.serve.store.tables import Race
+from racecraft.serve.store.tables import Race, User
 from racecraft.serve.submissions.finalists import board_of
 
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
@@ -60,6 +60,8 @@ class SeasonStanding:
 def read_season(session: Session, group_id: int, *, public: bool = False) -> list[SeasonStanding]:
     """Who has how many points in a group, most first; of equals who has won more. Practice is none of it.
 
+    Who has deleted their account is none of it either, also where they were in a final, whose places stay as driven.
+
     Args:
         session: To read in.
         group_id: Whose.
@@ -81,4 +83,7 @@ def read_season(session: Session, group_id: int, *, public: bool = False) -> lis
             behind = row.score_ms / board.first_ms - 1.0 if row.score_ms and board.first_ms else None
             result = SeasonRace(race=race.id, title=race.title, place=row.place, points=points, gap=behind)
             found.setdefault(row.user, SeasonStanding(row.user, row.name)).results.append(result)
+    gone = session.scalars(sa.select(User.id).where(User.id.in_(found), User.deleted.is_not(None)))
+    for user in gone:
+        del found[user]
     return sorted(found.values(), key=lambda one: (-one.points, -one.wins, one.user))
