@@ -159,3 +159,26 @@ def test_a_teacher_renames_a_class_closes_it_and_opens_it_again(
     page.get_by_role("button", name=again).press("Enter")
     expect(button).to_be_focused()
     expect(page.get_by_role("heading", name=new_race)).to_be_visible()
+
+
+@needs_axe
+def test_the_audit_log_is_read_on_a_phone(league: RunningLeague, visit: Visit) -> None:
+    group = league.group("Class 7b, which meets on Fridays")
+    league.join(league.code(group), "Comet")
+    member = ok(league.owner.get(f"/api/groups/{group}"))["members"][1]["id"]
+    ok(league.owner.post(f"/api/groups/{group}/members/{member}/revoke"), 204)
+    page = visit.open("/league/audit", width=360, height=740)
+    log = page.get_by_role("region", name="Audit log")
+    log.get_by_text("revoke_member").wait_for()
+    assert log.evaluate("one => one.scrollWidth - one.clientWidth") <= 0, "nothing of it is beyond the edge"
+    for text in (
+        "revoke_member",
+        f"/api/groups/{group}/members/{member}/revoke",
+        "title Class 7b, which meets on Fridays",
+    ):
+        box = log.get_by_text(text).bounding_box()
+        assert box is not None, text
+        assert box["x"] >= 0, text
+        assert box["x"] + box["width"] <= 360, text
+    assert visit.overflow() <= 0
+    assert visit.violations() == []
