@@ -249,6 +249,14 @@ def test_the_weights_of_the_pretrained_model_until_there_are_own_ones(tmp_path: 
     name, notes = imported(models.as_folder(files, tmp_path / "b"))
     assert name == "model_4.pb"
     assert any("the weights of 'older'; it begins with the last ones" in note for note in notes)
+    found = import_run(tmp_path / "b", name="told", checkpoint="4")
+    assert any("the weights of 'older'; it begins with those of 4." in note for note in found.notes)
+    for setting in ("DR_LOCAL_S3_PRETRAINED=True", "DR_LOCAL_S3_PRETRAINED_PREFIX=older"):
+        assert found.used[setting] == "weights to begin with"
+        assert setting not in found.unused
+    fresh = import_run(tmp_path / "b", name="fresh", checkpoint="none")
+    assert not any("it begins with" in note for note in fresh.notes)
+    assert "DR_LOCAL_S3_PRETRAINED=True" in fresh.unused
     del files["data/minio/bucket/older/model/model_4.pb"]
     name, notes = imported(models.as_folder(files, tmp_path / "c"))
     assert name == ""

@@ -72,6 +72,14 @@ def test_a_bad_model_is_one_sentence_and_makes_no_run(files: dict[str, str], say
         assert nothing_was_made()
 
 
+def test_the_hint_for_a_file_of_another_name(tmp_path: Path) -> None:
+    files = {**models.DRFC, "run.env": "DR_LOCAL_S3_REWARD_KEY=custom_files/reward_v2.py"}
+    files["custom_files/reward_v3.py"] = models.REWARD
+    with pytest.raises(SourceError, match=r"custom_files/reward_v2\.py is not there") as caught:
+        import_run(models.as_folder(files, tmp_path / "m"))
+    assert caught.value.hint == "Did you mean 'custom_files/reward_v3.py'?"
+
+
 def test_the_hint_for_a_world_that_is_not_here(tmp_path: Path) -> None:
     with pytest.raises(RacecraftError) as caught:
         import_run(models.as_folder({**models.DRFC, "run.env": "DR_WORLD_NAME=reinvent_base"}, tmp_path / "d"))

@@ -150,6 +150,8 @@ class DrfcSettings:
     """Name of the model; empty where it is not given."""
     pretrained: str
     """Name of the model whose weights it was to go on from; empty where there is none."""
+    pretraining: tuple[str, ...]
+    """The settings that say so, as they were given."""
     pretrained_checkpoint: str
     """Which of them: ``best`` or ``last``."""
     without_effect: dict[str, str]
@@ -199,6 +201,7 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
         used=used,
         prefix=values.get(MODEL_PREFIX, ""),
         pretrained=pretrained,
+        pretraining=tuple(f"{key}={values[key]}" for key in PRETRAINING if key in values),
         pretrained_checkpoint="best" if values.get(PRETRAINED_CHECKPOINT) == "best" else "last",
         without_effect=without_effect,
         unknown=unknown,

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
-from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean, typed
+from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
@@ -43,7 +42,7 @@ from racecraft.importing.own import OwnRun, read_own
 from racecraft.importing.policy_weights import has_critic
 from racecraft.importing.report import ImportedRun, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
-from racecraft.importing.weights import open_model, read_weights, save_weights
+from racecraft.importing.weights import open_model, or_other_weights, read_weights, save_weights
 from racecraft.json_file import parse_json_object
 from racecraft.learn.learner import Weights
 from racecraft.race.rules import RaceRules
@@ -163,7 +162,7 @@ def import_run(
         model.unused.update(job.unused)
         tensors = None
         if own is None and model.weights is not None:
-            with _or_other_weights(model.weights):
+            with or_other_weights(model.weights):
                 tensors = stack.enter_context(open_model(source, model.weights))
         if own is not None:
             settings = own.settings
@@ -181,7 +180,7 @@ def import_run(
         spec = settings.network_spec(metadata)
         weights: Weights = {}
         if tensors is not None:
-            with _or_other_weights(model.weights):
+            with or_other_weights(model.weights):
                 weights = read_weights(tensors, spec, metadata.suite, model.notes)
         if network:
             model.used[f"--network {network}"] = "network"
@@ -229,7 +228,11 @@ def _read_params(model: _Model) -> tuple[TrainingParams, dict[str, str]]:
             base = place.rpartition("/")[2]
             there = [one for one in (place, base) if f"{model.root}{CUSTOM_FILES}/{one}" in source.files]
             if not there and base != aws:
-                raise SourceError(f"run.env names {place!r} as the {aws}, but {CUSTOM_FILES}/{place} is not there.")
+                near = [file for file in source.files if file.startswith(f"{model.root}{CUSTOM_FILES}/")]
+                raise SourceError(
+                    f"run.env names {place!r} as the {aws}, but {CUSTOM_FILES}/{place} is not there.",
+                    hint=did_you_mean(f"{model.root}{CUSTOM_FILES}/{place}", near),
+                )
             drfc.files[aws] = there[0] if there else base
             for key, became in drfc.used.items():
                 if became == f"{CUSTOM_FILES}/{place}":
@@ -267,12 +270,17 @@ def _find_weights(model: _Model, checkpoint: str, network: str) -> ModelFiles | 
             model.notes.append(f"{model.unread} was left out: without a {METADATA} nobody knows what it answers.")
         return None
     drfc = model.drfc
-    if drfc is not None and drfc.pretrained and not find_models(names):
+    if drfc is not None and drfc.pretrained and checkpoint != NONE and not find_models(names):
         other = f"{_bucket(model)}{drfc.pretrained}/"
         names = [name for name in model.source.files if name.startswith(other) and role(name) == "weights"]
         model.is_pretrained = True
         checkpoint = drfc.pretrained_checkpoint if checkpoint == BEST else checkpoint
-        begins = f"the {checkpoint} ones" if find_models(names) else "fresh ones, since they are not among the files"
+        begins = "fresh ones, since they are not among the files"
+        if find_models(names):
+            begins = f"the {checkpoint} ones" if checkpoint in (BEST, LAST) else f"those of {checkpoint}"
+            for label in drfc.pretraining:
+                del model.unused[label]
+                model.used[label] = "weights to begin with"
         model.notes.append(f"The model was to go on from the weights of {drfc.pretrained!a}; it begins with {begins}.")
     return choose_model(model.source, names, checkpoint, model.notes)
 
@@ -293,18 +301,6 @@ def _read_own(model: _Model, checkpoint: str, track: str, *, is_other: bool) -> 
             "and racecraft train --from takes its weights along."
         )
     return own if own is None or checkpoint != NONE else replace(own, files={})
-
-
-@contextmanager
-def _or_other_weights(weights: ModelFiles | None) -> Iterator[None]:
-    """Within, an error of the weights says how to do without them."""
-    try:
-        yield
-    except SourceError as error:
-        hint = f"{error.hint} With --checkpoint none the run begins with fresh weights.".strip()
-        if weights is not None and weights.is_checkpoint and weights.graph:
-            hint = f"{hint} With --checkpoint {typed(weights.graph)} it begins with those of its graph."
-        raise SourceError(str(error), hint=hint) from error
 
 
 def _origin(model: _Model, weights: ModelFiles, *, has_critic: bool) -> dict[str, Any]:

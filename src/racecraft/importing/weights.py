@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from racecraft.agent.sensor_suite import SensorSuite
-from racecraft.errors import SourceError
+from racecraft.errors import SourceError, typed
 from racecraft.importing.frozen_graph import FrozenGraph, open_frozen_graph
 from racecraft.importing.model_files import ModelFiles
 from racecraft.importing.policy_weights import (
@@ -50,6 +50,22 @@ def open_model(source: Source, model: ModelFiles) -> Iterator[Tensors]:
         assert graph is not None
         with open_frozen_graph(graph, name=model.name) as tensors:
             yield tensors
+
+
+@contextmanager
+def or_other_weights(weights: ModelFiles | None) -> Iterator[None]:
+    """Within, an error of the weights says how to do without them.
+
+    Raises:
+        SourceError: The one of the weights.
+    """
+    try:
+        yield
+    except SourceError as error:
+        hint = f"{error.hint} With --checkpoint none the run begins with fresh weights.".strip()
+        if weights is not None and weights.is_checkpoint and weights.graph:
+            hint = f"{hint} With --checkpoint {typed(weights.graph)} it begins with those of its graph."
+        raise SourceError(str(error), hint=hint) from error
 
 
 def read_weights(tensors: Tensors, spec: NetworkSpec, sensors: SensorSuite, notes: list[str]) -> Weights:
