@@ -215,6 +215,13 @@ def test_a_model_without_weights_needs_a_reward(tmp_path: Path) -> None:
     assert found.used["--reward centerline"] == "reward_function.py"
 
 
+def test_a_packed_log_is_no_archive_inside(tmp_path: Path) -> None:
+    files = {**models.MODEL, "logs/a.csv.gz": b"\x1f\x8b", "logs/b.tar.gz": b"\x1f\x8b"}
+    found = import_run(models.as_folder(files, tmp_path / "m"))
+    assert found.unused["logs/a.csv.gz (2 bytes)"] == "nothing that is read"
+    assert found.unused["logs/b.tar.gz (2 bytes)"] == "archives inside are not opened; import one by itself"
+
+
 def test_a_download_of_logs_alone(tmp_path: Path) -> None:
     found = import_run(models.as_zip(models.HISTORY, tmp_path / "logs.zip"), reward="centerline", track="oval")
     assert sorted(found.kept) == sorted(models.HISTORY)

@@ -106,6 +106,15 @@ def test_paths_that_are_no_models(path: str, says: str, tmp_path: Path) -> None:
     assert nothing_was_made()
 
 
+@pytest.mark.parametrize("name", ["0-iteration.csv", "robo maker.log", "console.csv.gz"])
+def test_logs_alone_are_for_another_verb(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"\x1f\x8b")
+    with pytest.raises(SourceError, match="alone is no model") as caught:
+        import_run(name)
+    typed = f"'{name}'" if " " in name else name
+    assert caught.value.hint.endswith(f"or hold it against the simulator: racecraft replay {typed}")
+
+
 def test_a_hostile_member_refuses_the_whole_archive(tmp_path: Path) -> None:
     archive = models.as_tar(models.MODEL, tmp_path / "model.tar")
     with tarfile.open(archive, "a") as tar:

@@ -70,7 +70,8 @@ def role(name: str) -> Role:
         return "video"
     if base.endswith(".py"):
         return "code"
-    return "archive" if is_archive_name(base) else "other"
+    is_packed_file = base.endswith((".csv.gz", ".log.gz", ".json.gz"))  # which are no archives
+    return "archive" if is_archive_name(base) and not is_packed_file else "other"
 
 
 def is_plain(name: str) -> bool:

@@ -114,7 +114,12 @@ def open_source(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterato
         raise SourceError(f"There is no file or folder {str(path)[:200]!r} to import.")
     elif path.suffix == ".py":
         yield _single(path)
-    elif path.name in PLACES or path.suffix in (".json", ".yaml", ".env", ".csv", ".log", ".pb", ".index"):
+    elif path.name.endswith((".csv", ".log", ".csv.gz", ".log.gz")):
+        raise SourceError(
+            f"{path.name} alone is no model.",
+            hint=f"Import the folder of its model, or hold it against the simulator: racecraft replay {typed(path)}",
+        )
+    elif path.name in PLACES or path.suffix in (".json", ".yaml", ".env", ".pb", ".index"):
         raise SourceError(
             f"{path.name} alone is no model.",
             hint=f"Import the folder it lies in: racecraft import {typed(path.parent)}",
