@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -182,3 +183,22 @@ def test_the_audit_log_is_read_on_a_phone(league: RunningLeague, visit: Visit) -
         assert box["x"] + box["width"] <= 360, text
     assert visit.overflow() <= 0
     assert visit.violations() == []
+
+
+@pytest.mark.parametrize("ahead", [timedelta(hours=1), timedelta(days=-400)])
+def test_a_race_ends_now_on_a_computer_whose_clock_is_wrong(
+    league: RunningLeague, visit: Visit, ahead: timedelta
+) -> None:
+    race = {"title": "Friday cup", "track": "oval", "laps": 1}
+    number = ok(league.owner.post(f"/api/groups/{league.group('Class 7b')}/races", json=race), 201)["id"]
+    own = ok(league.owner.post("/api/races", json=race), 201)["id"]
+    visit.page.clock.set_fixed_time(datetime.now(UTC) + ahead)
+    page = visit.open(f"/league/{number}")
+    page.get_by_role("button", name="End the race").click()
+    page.get_by_role("alert").get_by_role("button", name="End the race").click()
+    page.get_by_text("Over", exact=True).wait_for()
+    assert ok(league.owner.get(f"/api/boards/{number}"))["race"]["secret"]
+    page = visit.open(f"/races/{own}")
+    page.get_by_role("button", name="Close the race").click()
+    page.get_by_text("Over", exact=True).wait_for()
+    assert ok(league.owner.get(f"/api/races/{own}"))["state"] == "closed"

@@ -205,15 +205,18 @@ class Races:
         with self._database.transaction() as session:
             hold(session, race_id)
             race = self._race(session, race_id)
-            if "closes" in request.model_fields_set and _is_told(race):
+            sets_end = "closes" in request.model_fields_set or request.is_over
+            if sets_end and _is_told(race):
                 reason = "it was driven under the old rules" if not race.commitment else "everybody knows its secret"
                 raise Conflict(
                     f"The race is over and cannot be opened again: {reason}.",
                     hint="Make another one; it starts from other places.",
                 )
-            for name, value in request.model_dump(exclude_unset=True).items():
+            for name, value in request.model_dump(exclude_unset=True, exclude={"is_over"}).items():
                 if name != "title" or value is not None:
                     setattr(race, name, value if value is not None or name == "closes" else "")
+            if request.is_over:
+                race.closes = now()
             if race.closes is not None and race.closes <= race.opens:
                 raise ConfigError("The race closes before it opens.", hint="Choose a later end, or none.")
 

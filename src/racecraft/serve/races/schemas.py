@@ -95,6 +95,8 @@ class RaceChange(Message):
     title: Title | None = None
     description: str | None = Field(None, max_length=500)
     closes: Moment | None = None
+    is_over: Literal[True] | None = None
+    """To end it now, by the server's clock: that of whoever asks may be wrong."""
 
 
 class RaceCard(Message):

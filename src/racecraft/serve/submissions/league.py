@@ -100,12 +100,13 @@ class League:
         self.get(race_id, user_id, organiser=True)
         with self._database.transaction() as session:
             race = session.get_one(Race, race_id)
-            if "closes" in request.model_fields_set and state_of(race) == "closed":
+            sets_end = "closes" in request.model_fields_set or request.is_over
+            if sets_end and state_of(race) == "closed":
                 raise Conflict("The race is over: everybody knows its secret.", hint="Make another one.")
-            if "closes" in request.model_fields_set and final_of(race) is not None:
+            if sets_end and final_of(race) is not None:
                 raise Conflict("A final in which two meet at a time ends when it has been driven.")
-            if "closes" in request.model_fields_set:
-                race.closes = request.closes
+            if sets_end:
+                race.closes = now() if request.is_over else request.closes
             race.title = request.title.strip() if request.title is not None else race.title
             race.description = request.description.strip() if request.description is not None else race.description
             if request.attempts_per_day is not None:

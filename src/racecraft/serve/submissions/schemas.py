@@ -74,6 +74,8 @@ class LeagueRaceChange(Message):
     title: Title | None = None
     description: str | None = Field(None, max_length=500)
     closes: Moment | None = None
+    is_over: Literal[True] | None = None
+    """To end it now, by the server's clock: that of whoever asks may be wrong."""
     is_public: bool | None = None
     is_frozen: bool | None = None
     attempts_per_day: int | None = Field(None, ge=0, le=1000)
