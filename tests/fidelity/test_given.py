@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, RewardError
 from racecraft.fidelity import calibrate, fit_frame, replay
 from racecraft.fidelity.given import log_files, track_of, vehicle_of
 from racecraft.sim import load_vehicle
@@ -48,6 +48,11 @@ REWARD = r"reward is .*; allowed is its source, which racecraft\.reward\.load_re
 def test_anything_else_is_one_sentence(given: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         replay(**{"logs": "a.csv", "track": "oval", **given})
+
+
+def test_a_reward_is_checked_as_before_a_training() -> None:
+    with pytest.raises(RewardError, match="'import pandas' is not allowed in a reward function"):
+        replay("a.csv", track="oval", reward="import pandas\ndef reward_function(params):\n    return 1.0\n")
 
 
 @pytest.mark.parametrize(

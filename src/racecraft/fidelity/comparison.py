@@ -127,10 +127,11 @@ def replay(
         check_type("rows", rows, (str, os.PathLike), "use a CSV file's path")
     paths, road, car = log_files(logs), track_of(track), vehicle_of(vehicle)
     if reward is not None:
-        from racecraft.reward import preset_names
+        from racecraft.reward import preset_names, validate_reward
 
         is_source = isinstance(reward, str) and reward not in preset_names() and not reward.endswith(".py")
         require("reward", reward, is_source, "its source, which racecraft.reward.load_reward(NAME_OR_FILE) reads")
+        validate_reward(reward)
     rules, agreement, faults, differences = TrackRules(road), RulesAgreement(), Faults(), Differences(rows)
     result = Comparison(road, car, agreement, faults, differences, np.zeros((0, len(REPORTED_STEPS), 2)), ())
     checked: set[str] = set()
