@@ -61,6 +61,14 @@ def test_noise_of_sac_is_taken():
     )
 
 
+def test_a_model_metadata_in_its_place_is_recognised():
+    with pytest.raises(
+        ConfigError, match=r"^m\.json has an action_space and no hyperparameter: it is a model_metadata"
+    ):
+        Hyperparameters.from_dict({"action_space": [], "version": "5"}, name="m.json")
+    assert Hyperparameters.from_dict({"action_space": [], "batch_size": 32}).batch_size == 32
+
+
 @pytest.mark.parametrize(
     ("field", "value", "allowed"),
     [

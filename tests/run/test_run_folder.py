@@ -97,11 +97,26 @@ def test_open_says_what_is_missing_and_guesses(tmp_path):
     with pytest.raises(RunError, match="There is no run") as error:
         RunFolder.open(tmp_path / "b@20480000")
     assert error.value.hint == "Did you mean 'b'?"
-    with pytest.raises(RunError, match=r"run.json is missing"):
+    with pytest.raises(RunError, match=r"run.json is missing") as error:
         RunFolder.open(tmp_path / "empty")
+    assert error.value.hint == ""
     with pytest.raises(RunError, match="There is no run") as error:
         RunFolder.open(tmp_path / ("x" * 5000))  # which a file system does not even look up
     assert len(str(error.value)) < 600
+
+
+def test_files_of_aws_s_are_imported_before_they_are_a_run(tmp_path):
+    (tmp_path / "my model").mkdir()
+    (tmp_path / "my model/model_metadata.json").write_text("{}")
+    (tmp_path / "car.tar.gz").write_bytes(b"x")
+    with pytest.raises(RunError, match=r"holds no run: run\.json is missing\.") as error:
+        RunFolder.open(tmp_path / "my model")
+    assert error.value.hint == f"racecraft import '{tmp_path}/my model' makes a run of a model of AWS's."
+    with pytest.raises(RunError, match=r"car\.tar\.gz' is an archive, not a run's folder\.") as error:
+        RunFolder.open(tmp_path / "car.tar.gz")
+    assert error.value.hint == f"racecraft import {tmp_path}/car.tar.gz makes a run of a model of AWS's."
+    with pytest.raises(RunError, match="There is no run"):
+        RunFolder.open(tmp_path / "other.tar.gz")
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 1}', '{"format": 2}', '{"format": 1, "seed": 1, "x": 2}'])

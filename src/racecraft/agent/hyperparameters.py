@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from racecraft.agent.metadata_words import plain
+from racecraft.errors import ConfigError
 from racecraft.json_file import read_json_object, write_json_object
 
 if TYPE_CHECKING:  # `file_model` knows these names: pydantic is for whom a file is there
@@ -117,6 +118,8 @@ class Hyperparameters:
         from racecraft.agent.aws_file import unknown_fields, validate
 
         checked = validate(_file(), document, name=name)
+        if "action_space" in document and not checked.model_fields_set.intersection(_file().model_fields):
+            raise ConfigError(f"{name} has an action_space and no hyperparameter: it is a model_metadata.json.")
         notes = list(unknown_fields(checked, name=name))
         if "stack_size" in document and document["stack_size"] not in (1, "1"):
             notes.append(f"{name}: stack_size {document['stack_size']} has no effect, the network sees one frame.")

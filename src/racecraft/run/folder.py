@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from racecraft.checks import check_type, shown
-from racecraft.errors import ConfigError, RunError, did_you_mean, quoted
+from racecraft.errors import ConfigError, RunError, did_you_mean, quoted, typed
 from racecraft.json_file import read_json_object, read_text
 from racecraft.moved import place_of
 from racecraft.run.atomic import write_file, write_json
@@ -51,6 +51,10 @@ MAX_REWARD_BYTES = 4 * 140_000  # AWS allows 140,000 characters
 MAX_NOTES_BYTES = 1 << 16
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # devices on Windows
+
+_OF_AWS = ("model_metadata.json", "reward_function.py", "run.env")
+"""Files that tell a folder that can be imported."""
+_ARCHIVES = (".tar.gz", ".tgz", ".tar", ".zip")
 
 
 @dataclass(frozen=True)
@@ -128,12 +132,16 @@ class RunFolder:
         if str(path).startswith(STARTER):
             path = unpack_starter(str(path).removeprefix(STARTER), "runs")
         path = place_of(path)
+        hint = f"racecraft import {typed(path)} makes a run of a model of AWS's."
         if not os.path.isdir(path):  # False of names too long for one, too
+            if path.name.endswith(_ARCHIVES) and os.path.isfile(path):
+                raise RunError(f"{shown(str(path))} is an archive, not a run's folder.", hint=hint)
             siblings = [run.path.name for run in list_runs(path.parent)]
             meant = path.name.partition("@")[0]  # a whole run is asked for where somebody names a checkpoint
             raise RunError(f"There is no run {shown(str(path))}.", hint=did_you_mean(meant, siblings))
         if not (path / "run.json").is_file():
-            raise RunError(f"{path} holds no run: run.json is missing.")
+            is_model = any((path / name).is_file() for name in _OF_AWS)
+            raise RunError(f"{path} holds no run: run.json is missing.", hint=hint if is_model else "")
         return cls(path)
 
     @property
