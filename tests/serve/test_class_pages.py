@@ -202,3 +202,23 @@ def test_a_race_ends_now_on_a_computer_whose_clock_is_wrong(
     page.get_by_role("button", name="Close the race").click()
     page.get_by_text("Over", exact=True).wait_for()
     assert ok(league.owner.get(f"/api/races/{own}"))["state"] == "closed"
+
+
+@needs_axe
+def test_the_code_on_the_wall_is_the_one_that_is_good_now(league: RunningLeague, visit: Visit) -> None:
+    group = league.group("Class 7b")
+    race = {"title": "Friday cup", "track": "oval", "laps": 1}
+    number = ok(league.owner.post(f"/api/groups/{group}/races", json=race), 201)["id"]
+    page = visit.open(f"/league/{number}/screen", width=1024, height=768)
+    page.get_by_role("img", name="Paperclip").wait_for()
+    join = page.get_by_role("heading", name="Join in")
+    assert join.count() == 0
+    for _ in range(2):
+        code = league.code(group)
+        page.get_by_text(f"{code[:4]}-{code[4:]}").wait_for()
+    size = page.get_by_text(f"{code[:4]}-{code[4:]}").evaluate("one => parseFloat(getComputedStyle(one).fontSize)")
+    assert size > 768 / 40, "read from the last row"
+    assert visit.overflow() <= 0
+    assert visit.violations() == []
+    ok(league.owner.delete(f"/api/groups/{group}/joining"), 204)
+    join.wait_for(state="detached")

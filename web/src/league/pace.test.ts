@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { paceOf, racesOf } from "./pace";
+import { paceOf, racesOf, ranksOf } from "./pace";
 
 const result = (race: number, gap: number | null) => ({ race, title: `r${race}`, place: 1, points: 0, gap });
 
@@ -18,5 +18,15 @@ describe("the pace over a season", () => {
       { ...row, results: [result(3, 0), result(2, 1)] },
     ];
     expect(racesOf(rows).map((one) => one.race)).toEqual([2, 3, 4]);
+  });
+
+  it("ranks who is level alike, and who comes next after all of them", () => {
+    const [one, other, none] = [
+      { points: 43, wins: 1 },
+      { points: 43, wins: 0 },
+      { points: 0, wins: 0 },
+    ];
+    expect(ranksOf([one, one, other, none, none, none])).toEqual([1, 1, 3, 4, 4, 4]);
+    expect(ranksOf([])).toEqual([]);
   });
 });

@@ -26,3 +26,7 @@ export function racesOf(rows: SeasonRow[]): { race: number; title: string }[] {
   const found = new Map(rows.flatMap((row) => row.results.map(({ race, title }) => [race, { race, title }] as const)));
   return [...found.values()].sort((a, b) => a.race - b.race);
 }
+
+/** Everybody's rank in a season, most points first: who is level in points and wins shares it, as a place in a race is shared. */
+export const ranksOf = (rows: Pick<SeasonRow, "points" | "wins">[]): number[] =>
+  rows.map(({ points, wins }) => 1 + rows.findIndex((one) => one.points === points && one.wins === wins));
