@@ -56,6 +56,7 @@ json_values = st.recursive(
 )
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("settings", [Hyperparameters, ModelMetadata])
 @given(data=st.data())
 def test_any_value_in_any_field_is_taken_or_refused_by_name(settings, data):

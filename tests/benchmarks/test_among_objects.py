@@ -49,6 +49,7 @@ def test_one_policy_is_judged_on_the_routes_that_are_wide_enough() -> None:
     assert last["over_minimum"][0] > 1.5
 
 
+@pytest.mark.costly
 def test_a_route_that_is_not_there_is_said() -> None:
     done = run("--routes", "library", "--only", "nowhere")
     assert done.returncode == 2

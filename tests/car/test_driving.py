@@ -97,6 +97,7 @@ def test_other_actions_and_sensors_drive_as_well(options: dict[str, object], tmp
     np.testing.assert_allclose(car.chosen[0], policy(sight), atol=1e-6)
 
 
+@pytest.mark.costly
 def test_the_evaluation_drives_what_the_car_makes_of_it_and_says_so(run: Path) -> None:
     outcome = evaluate_as_car(run, car=MEASURED, laps=1, num_trials=2, max_resets=1, video=False, num_threads=1)
     (steering, speed) = (ROW_COLUMNS.index(name) for name in ("steering_angle", "speed"))
@@ -148,6 +149,7 @@ def test_the_camera_has_the_look_that_the_run_was_trained_with(tmp_path: Path) -
     assert outcome.evaluation.conditions.camera == replace(CAMERAS_BY_NAME["2026"], width=640, height=480)
 
 
+@pytest.mark.costly
 def test_latency_is_the_randomisation_s(run: Path, tmp_path: Path) -> None:
     car = tmp_path / "car.json"
     CarCalibration(latency_seconds=0.05, slider_percent=33.333).save(car)

@@ -57,6 +57,7 @@ def test_a_memory_smaller_than_the_warm_up_is_warm_when_it_is_full(
         assert (weights != late.policy.arrays[name]).any(), name
 
 
+@pytest.mark.costly
 def test_a_limit_in_seconds_lets_it_learn_until_then(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
 

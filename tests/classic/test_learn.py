@@ -64,6 +64,7 @@ def blas_threads() -> set[int]:
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 
 
+@pytest.mark.costly
 def test_products_take_one_thread_while_it_learns_and_judges(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # with two, CartPole's DQN took another course, and forty times the processor on a busy machine
     import_module("scipy.linalg")  # brings a library of its own, after the one found when learning was imported
@@ -217,6 +218,7 @@ def test_who_does_not_wait_for_the_last_episodes_keeps_what_was_learned(
     assert load(tmp_path / "a")[2] > 0
 
 
+@pytest.mark.costly
 def test_processes_of_a3c_leave_ctrl_c_to_their_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     groups, begin = list[int](), subprocess.Popen
 
@@ -248,6 +250,7 @@ register("Failing-v0", entry_point=Failing, max_episode_steps=100)
 """
 
 
+@pytest.mark.costly
 def test_a_process_of_a3c_whose_world_fails_is_told_in_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,6 +43,7 @@ def played(name: str) -> list[Any]:
     return came
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", EPISODES)
 def test_a_quick_world_is_gymnasiums_to_the_bit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     own = played(name)

@@ -111,6 +111,7 @@ def test_seeds() -> None:
         assert (first.step(np.zeros(3, np.int64)).successors == same.step(np.zeros(3, np.int64)).successors).all()
 
 
+@pytest.mark.costly
 def test_our_own_cars_are_the_same_alone_and_together() -> None:
     from racecraft.classic.recipes import MAKE
 

@@ -11,6 +11,7 @@ from command_line import Run
 from racecraft.run import read_metrics, read_simtrace
 
 
+@pytest.mark.costly
 def test_evaluate(racecraft: Run, trained: Path) -> None:
     outcome = racecraft("evaluate", str(trained), "--laps", "1", "--trials", "2", "--no-video", "--max-resets", "2")
     assert outcome.status == 0

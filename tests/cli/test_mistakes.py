@@ -148,6 +148,7 @@ def test_what_an_error_says_is_no_markup(racecraft: Run, tmp_path: Path) -> None
     assert "[bold]x[/bold]" in racecraft("train", "--critic", "[bold]x[/bold]").err
 
 
+@pytest.mark.costly
 def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     command = f"{sys.executable} -m racecraft tracks | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, check=False)

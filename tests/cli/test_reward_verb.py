@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from command_line import GOOD_REWARD, Run
 
 BAD = "def reward_function(params):\n    return params['progres']\n"
@@ -59,12 +60,14 @@ def test_a_reward_that_fails_in_a_situation_says_in_which(racecraft: Run, tmp_pa
     assert failed == ["off track"]
 
 
+@pytest.mark.costly
 def test_a_failure_of_numpys_is_told_with_what_to_write_instead(racecraft: Run, tmp_path: Path) -> None:
     raised = "TypeError('only 0-dimensional arrays can be converted to Python scalars')"
     (tmp_path / "reward_function.py").write_text(f"def reward_function(params):\n    raise {raised}\n")
     assert "hint: NumPy makes a number only of" in racecraft("reward", "check", "reward_function.py").out
 
 
+@pytest.mark.costly
 def test_a_reward_is_tried_among_as_many_objects_as_are_asked_for(racecraft: Run, tmp_path: Path) -> None:
     source = "def reward_function(params):\n    return len(params['objects_speed']) / any(params['objects_speed'])\n"
     (tmp_path / "reward_function.py").write_text(source)

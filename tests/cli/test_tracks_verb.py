@@ -32,6 +32,7 @@ def test_the_limit_of_a_track(racecraft: Run) -> None:
     assert "Medals: author" in racecraft("tracks", "show", "oval", "--width", "400").out
 
 
+@pytest.mark.costly
 def test_a_sheet_of_tracks(racecraft: Run) -> None:
     from PIL import Image
 

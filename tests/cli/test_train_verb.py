@@ -13,6 +13,7 @@ import pytest
 from command_line import GOOD_REWARD, SMALL, Run
 
 
+@pytest.mark.costly
 def test_train_ends_with_one_json_object(racecraft: Run) -> None:
     outcome = racecraft("train", *SMALL, "--until", "1024 steps", "--seed", "3", "--name", "mine", "--json")
     assert (outcome.status, outcome.err) == (0, "")
@@ -26,6 +27,7 @@ def test_train_ends_with_one_json_object(racecraft: Run) -> None:
     assert json.loads(Path("runs/mine/run.json").read_text())["seed"] == 3
 
 
+@pytest.mark.costly
 def test_notes_on_the_files_are_in_the_json_or_on_stderr(racecraft: Run) -> None:
     Path("hyperparameters.json").write_text(json.dumps({"num_epochs": 1, "num_epoch": 3, "batch_size": 32}))
     command = ("train", *SMALL, "--hyperparameters", "hyperparameters.json", "--until", "1 steps")

@@ -160,6 +160,7 @@ def ladder(models: list[Any], **settings: Any):
     return rate_models(models, **given)
 
 
+@pytest.mark.costly
 def test_a_ladder_is_the_same_again_from_its_seed(models: list[Path]) -> None:
     field = [*models, f"{models[0]}@64"]
     found = ladder(field, seed=4, tracks=["oval", "reinvent_2018"])

@@ -182,6 +182,7 @@ def test_progress_is_kept() -> None:
     assert read_progress().to_dict() == {"exercises": ["1.inside"], "quizzes": {"3": 0.75}}
 
 
+@pytest.mark.costly
 def test_two_processes_keep_what_both_solve() -> None:
     solves = "import sys; from racecraft.course.progress import record_exercise, record_quiz\n"
     solves += "print(flush=True); input()\n"

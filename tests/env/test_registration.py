@@ -37,6 +37,7 @@ def test_make_vec_takes_the_native_batch_by_itself():
         envs.close()
 
 
+@pytest.mark.costly
 def test_make_vec_can_still_wrap_single_environments():
     for mode, kind in (("sync", SyncVectorEnv), ("async", AsyncVectorEnv)):
         envs = gymnasium.make_vec(ENV_ID, num_envs=2, vectorization_mode=mode, **SETTINGS)
@@ -57,6 +58,7 @@ def test_make_limits_the_steps_of_both():
     envs.close()
 
 
+@pytest.mark.costly
 def test_episodes_are_as_long_as_the_spec_says():
     default = inspect.signature(DrivingTask).parameters["max_episode_steps"].default
     assert gymnasium.spec(ENV_ID).max_episode_steps == default
@@ -87,6 +89,7 @@ def test_registering_again_does_nothing():
     assert gymnasium.spec(ENV_ID).to_json()
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("module", ["racecraft", "racecraft.env"])
 def test_an_id_can_name_the_module_to_import(module):
     code = (

@@ -114,6 +114,7 @@ def choices(model: str, frames: NDArray[np.uint8]) -> NDArray[np.intp]:
     return np.concatenate([learner.policy(learner.encode(part)).argmax(axis=1) for part in parts])
 
 
+@pytest.mark.costly
 def test_frames_of_a_lap_that_no_colour_was_fitted_to_are_reproduced():
     judged = lap(JUDGED)
     ours = drawn(judged.taken)

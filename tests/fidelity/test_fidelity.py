@@ -81,6 +81,7 @@ def test_the_car_of_version_6():
     assert all(error < bar for error, bar in zip(medians(found), (3.0, 5.5, 8.5), strict=True))
 
 
+@pytest.mark.costly
 def test_every_row_of_the_other_eras_that_differs_is_explained():
     for folder, route, marks in (
         ("droa", "Spain_track", 14),

@@ -74,6 +74,7 @@ def assert_same_bits(a, b) -> None:
         assert array.tobytes() == b[name].tobytes(), name
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", NAMES)
 def test_frames_are_encoded_as_in_numpy(name):
     spec = NetworkSpec(name=name, num_actions=2)
@@ -394,6 +395,7 @@ def test_a_gradient_flows_through_the_weights_that_were_loaded_last():
     assert_same_bits(gradient_of(learner, batch, OBJECTIVE)[1], gradient_of(fresh, batch, OBJECTIVE)[1])
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("name", ["RACECRAFT_SMALL", "DEEP_CONVOLUTIONAL_NETWORK_DEEP"])
 def test_weights_begin_as_those_of_torch(name):
     spec = NetworkSpec(name=name, num_actions=3, is_discrete=False, state_size=6)

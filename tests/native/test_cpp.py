@@ -122,6 +122,7 @@ def runs(folder: Path, programs: tuple[str, ...] = PROGRAMS, *words: str, **envi
         return {name: pool.submit(run, [folder / name, *words], **environment) for name in programs}
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("program", [*SHORT, *(pytest.param(name, marks=pytest.mark.costly) for name in LONG)])
 def test_release(program):
     programs = LONG if program in LONG else SHORT

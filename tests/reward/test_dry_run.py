@@ -181,6 +181,7 @@ def reward_function(params):
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("source", REMEMBERING.values(), ids=REMEMBERING)
 @pytest.mark.parametrize("name", ["reinvent_2018", "oval", "straight"])
 def test_what_a_function_remembers_of_another_situation_is_no_mistake_of_its_own(name, source):
@@ -190,6 +191,7 @@ def test_what_a_function_remembers_of_another_situation_is_no_mistake_of_its_own
         assert [outcome.printed for outcome in outcomes] == [f"{outcome.params['steps']}\n" for outcome in outcomes]
 
 
+@pytest.mark.costly
 def test_a_mistake_is_found_in_a_function_that_remembers(track):
     mistake = "    last['n'] = last.get('n', 0) + 1\n    1 / (last['n'] - 2)\n    return"
     broken = REMEMBERING["every step"].replace("    return", mistake)
@@ -278,6 +280,7 @@ RELIES_ON_OBJECTS = (
 )
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("among", AMONG)
 def test_a_function_may_rely_on_objects(track, among):
     assert all(outcome.error is None for outcome in dry_run(RELIES_ON_OBJECTS, track, **AMONG[among]))

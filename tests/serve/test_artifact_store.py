@@ -146,6 +146,7 @@ def test_two_machines_take_turns(tmp_path: Path, url: str) -> None:
     assert not list(incoming.iterdir())
 
 
+@pytest.mark.costly
 def test_a_copy_taken_while_checkpoints_are_saved_holds_those_of_one_moment(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "runs")
     store, is_ended = Artifacts(f"file://{tmp_path}/store"), threading.Event()

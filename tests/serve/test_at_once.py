@@ -93,6 +93,7 @@ def test_of_cards_links_and_codes_that_are_made_together_one_is_good(database: D
             assert count(database, column) == 1
 
 
+@pytest.mark.costly
 def test_a_first_password_is_one_of_those_that_are_given_together(database: Database) -> None:
     people = People(database)
     given: list[bool] = []

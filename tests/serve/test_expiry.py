@@ -175,6 +175,7 @@ def test_a_printed_card_is_good_until_it_is_revoked(keys: Keys, clock: Clock) ->
 # ---- within a second
 
 
+@pytest.mark.costly
 def test_who_is_shut_out_is_refused_at_once_and_their_streams_end_within_a_second(
     keys: Keys, make_guard: Callable[[], Guard]
 ) -> None:

@@ -56,6 +56,7 @@ def test_the_migrations_make_the_tables_that_the_code_expects(database: Database
         assert all(columns[c.name]["nullable"] == c.nullable for c in table.columns)
 
 
+@pytest.mark.costly
 def test_the_migrations_and_the_tables_made_at_once_are_the_same(database_url: str) -> None:
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext

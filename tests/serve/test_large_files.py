@@ -121,6 +121,7 @@ def refused(path: Path) -> None:
         read_match(path, 0)
 
 
+@pytest.mark.costly
 def test_a_race_of_a_ladder_is_not_unpacked_without_end(tmp_path: Path) -> None:
     path = tmp_path / "matches.zip"
     assert read_match(archive(path), 0) == RACE
@@ -128,6 +129,7 @@ def test_a_race_of_a_ladder_is_not_unpacked_without_end(tmp_path: Path) -> None:
     assert path.stat().st_size < 1 << 20
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("is_long", [False, True])
 def test_a_ladder_is_not_told_of_millions_of_races(tmp_path: Path, is_long: bool) -> None:
     data = archive(tmp_path / "matches.zip").read_bytes()

@@ -240,7 +240,7 @@ def test_until_a_final_is_over_its_films_are_coarse_and_a_job_that_is_begun_agai
     exact = np.array(ok(season.teacher.get(f"{address}/film"))["cars"][0]["trace"])
     with rows_of(season) as session:
         race = session.get_one(Race, bracket)
-        race.closes = None
+        race.closes, race.over = None, None
         session.delete(session.get_one(Duel, (bracket, 1)))
         for seed in (1, 2, 3):
             session.get_one(Finalist, (bracket, seed)).place = None

@@ -21,6 +21,7 @@ def heard(queue: JobQueue) -> threading.Thread:
     return listening
 
 
+@pytest.mark.costly
 def test_who_listens_hears_of_each_new_job_for_workers_once(
     database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -90,6 +90,7 @@ def ended(check: Callable[[], object]) -> bool:
     return False
 
 
+@pytest.mark.costly
 def test_who_goes_while_they_enter_has_no_entry_in_the_race(
     database: Database, entries: Entries, entry: bytes, meanwhile: Meanwhile
 ) -> None:
@@ -118,6 +119,7 @@ def test_who_is_no_member_any_more_when_their_file_is_read_does_not_enter(
         assert session.scalars(sa.select(Submission)).all() == []
 
 
+@pytest.mark.costly
 def test_what_is_restored_while_its_owner_goes_stays_out(
     database: Database, entries: Entries, entry: bytes, meanwhile: Meanwhile
 ) -> None:
@@ -133,6 +135,7 @@ def test_what_is_restored_while_its_owner_goes_stays_out(
     assert ended(is_out)
 
 
+@pytest.mark.costly
 def test_a_name_that_comes_with_an_organisers_does_not_stay_for_it(database: Database, meanwhile: Meanwhile) -> None:
     people = People(database)
     meanwhile(people_module, "checked_name", lambda: people.rename(ADA, "Lovelace", by_organiser=True))
@@ -142,6 +145,7 @@ def test_a_name_that_comes_with_an_organisers_does_not_stay_for_it(database: Dat
         people.rename(ADA, "Rude")
 
 
+@pytest.mark.costly
 def test_no_two_races_follow_each_other(database: Database, league: League, meanwhile: Meanwhile) -> None:
     refused: list[Conflict] = []
 
@@ -156,6 +160,7 @@ def test_no_two_races_follow_each_other(database: Database, league: League, mean
     assert ended(lambda: refused)
 
 
+@pytest.mark.costly
 def test_no_race_follows_one_that_is_put_away_meanwhile(
     database: Database, league: League, meanwhile: Meanwhile
 ) -> None:

@@ -162,6 +162,7 @@ def test_a_sentence_of_a_child_is_never_long(court: Court, entry: bytes, monkeyp
 # ---- done
 
 
+@pytest.mark.costly
 def test_an_entry_counts_in_the_moment_in_which_it_is_done(
     court: Court, entry: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -125,6 +125,7 @@ def least_ground_and_sharpest_turn(track: Track) -> tuple[float, float]:
     return float(distance[is_elsewhere].min()) - track.mean_width, float(turned.max())
 
 
+@pytest.mark.costly
 def test_a_verge_folds_the_road_and_is_kept():
     options = {"width": 1.07, "radius": 0.45, "difficulty": 1}
     folded = [generate_track(seed, verge=0.3, **options) for seed in range(16)]

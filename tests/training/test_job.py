@@ -96,6 +96,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_does_not(tiny: Train) -> 
         assert_same(first.run, other.run)
 
 
+@pytest.mark.costly
 def test_evaluations_do_not_touch_what_is_learned(tiny: Train) -> None:
     often, seldom = tiny(evaluate_every=64), tiny(evaluate_every=512)
     for name, array in RunFolder.open(often.run).checkpoints.load("last").arrays.items():
@@ -219,6 +220,7 @@ def test_continuous_actions(tiny: Train) -> None:
     assert np.ptp(trace["steer"]) > 10
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("direction", ["reverse", "alternate"])
 def test_directions(tiny: Train, direction: str) -> None:
     result = tiny(direction=direction, until="1024 steps")
@@ -227,6 +229,7 @@ def test_directions(tiny: Train, direction: str) -> None:
     assert f"ALTERNATE_DRIVING_DIRECTION: {'true' if direction == 'alternate' else 'false'}" in params
 
 
+@pytest.mark.costly
 def test_a_reward_that_remembers_has_a_memory_for_each_car(tiny: Train, tmp_path: Path) -> None:
     source = tmp_path / "reward_function.py"
     source.write_text(
@@ -307,6 +310,7 @@ def test_a_taken_name_is_refused(tiny: Train) -> None:
 # ---- how it learned
 
 
+@pytest.mark.costly
 def test_laps_of_a_training_are_kept_and_change_nothing(tiny: Train, monkeypatch: pytest.MonkeyPatch) -> None:
     from racecraft.judging.evolution import drive_checkpoint, evolution_of
     from racecraft.run.evolution import read_drives

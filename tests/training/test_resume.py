@@ -114,6 +114,7 @@ def test_a_run_killed_20_times_ends_as_if_it_never_was(tiny: Train, tmp_path: Pa
     assert logs(run) == logs(undisturbed.run)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_saves_and_the_run_goes_on_to_the_same_weights(
     tiny: Train, tmp_path: Path, number: signal.Signals
@@ -222,6 +223,7 @@ def test_a_run_in_use_is_refused(tiny: Train) -> None:
     assert len(refused) == 1
 
 
+@pytest.mark.costly
 def test_a_track_that_changed_since_is_refused(tiny: Train, tmp_path: Path) -> None:
     def save(seed: int) -> None:
         track = generate_track(seed)

@@ -68,6 +68,7 @@ def test_it_learns_on_from_what_that_knew(tiny: Train, parent: Path) -> None:
     assert 0 < moved < 0.1 < np.abs(fresh - before[name]).max()
 
 
+@pytest.mark.costly
 def test_killed_before_its_first_checkpoint_it_begins_with_the_same(tiny: Train, parent: Path, tmp_path: Path) -> None:
     short = {"distill": replace(taught(SHORT), teacher_steps=1), "algorithm": "distill"}
     settings: dict[str, Any] = {"parent": parent, "until": "64 steps", "evaluate_every": 64, "num_threads": 1, **short}

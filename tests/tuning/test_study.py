@@ -175,6 +175,7 @@ def test_numbers_of_now_that_lie_outside_the_bounds_are_the_first_trial_and_teac
     assert set(book.importances()) == {"gamma", "minibatch_size"}
 
 
+@pytest.mark.costly
 def test_what_kills_its_process_again_and_again_has_failed(tmp_path: Path) -> None:
     book = Tuning(begin(tmp_path))._record()
     for _ in range(record.MAX_LOSSES):
@@ -263,6 +264,7 @@ def test_a_trial_that_fails_is_told_and_the_search_goes_on(tmp_path: Path) -> No
     assert outcome.best.params["K"] < 3
 
 
+@pytest.mark.costly
 def test_a_full_disk_ends_the_search_and_is_no_trials_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def no_space(*_: Any, **__: Any) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -277,6 +279,7 @@ def test_a_full_disk_ends_the_search_and_is_no_trials_fault(tmp_path: Path, monk
     assert outcome.trials[0].params == outcome.trials[1].params
 
 
+@pytest.mark.costly
 def test_a_study_that_is_damaged_in_the_middle_is_told_in_a_sentence(tmp_path: Path) -> None:
     folder = begin(tmp_path)
 
@@ -289,6 +292,7 @@ def test_a_study_that_is_damaged_in_the_middle_is_told_in_a_sentence(tmp_path: P
         Tuning(folder).past()
 
 
+@pytest.mark.costly
 def test_what_does_not_train_now_is_an_error_and_no_search(tmp_path: Path) -> None:
     reward = tmp_path / "reward_function.py"
     reward.write_text("K = 1\n\ndef reward_function(params):\n    return params['sped'] * K\n")
