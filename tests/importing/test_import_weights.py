@@ -148,6 +148,22 @@ def test_what_belongs_together_of_the_states_of_a_model() -> None:
     ]
 
 
+def test_who_imports_in_the_models_folder_imports_the_model_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {**small(), "model_7.pb": models.GRAPH, "metrics/TrainingMetrics.json": models.metrics()}
+    monkeypatch.chdir(models.as_folder(files, tmp_path / "m"))
+    found = [import_run(".", name=name) for name in ("first", "second", "third")]
+    assert [one.used for one in found] == [found[0].used] * 3
+    assert [one.kept for one in found] == [["metrics/TrainingMetrics.json"]] * 3
+    assert "weights of the policy" in found[2].used.values()
+    assert found[2].unused["runs/first/ and 1 more"] == "runs of Racecraft's own"
+    again = import_run(found[2].run, name="again")  # a run by itself is one
+    assert again.kind.startswith("archive of Racecraft")
+    with pytest.raises(SourceError, match="4 models"):
+        import_run("runs")
+
+
 def test_weights_of_which_nobody_knows_what_they_answer(tmp_path: Path) -> None:
     folder = models.as_folder({"reward_function.py": models.REWARD, "model_7.pb": models.GRAPH}, tmp_path / "m")
     name, notes = imported(folder)

@@ -34,8 +34,10 @@ from racecraft.importing.layout import (
     SYSTEM_ENV,
     TRAINING_PARAMS,
     find_root,
+    is_below,
     is_of_others,
     role,
+    runs_inside,
 )
 from racecraft.importing.model_files import BEST, LAST, NONE, ModelFiles, choose_model, find_models
 from racecraft.importing.own import OwnRun, read_own
@@ -136,7 +138,14 @@ def import_run(
     checkpoint = str(checkpoint)
     with ExitStack() as stack:
         source = stack.enter_context(open_source(path))
-        model = _Model(source, "" if source.reward else find_root(source.files, source=source.title))
+        root_inside = "" if source.reward else find_root(source.files, source=source.title)
+        runs = runs_inside(source.files, root_inside)
+        source = replace(source, files={name: file for name, file in source.files.items() if not is_below(name, runs)})
+        model = _Model(source, root_inside)
+        if runs:
+            model.unused[min(runs) + (f" and {len(runs) - 1} more" if len(runs) > 1 else "")] = (
+                "runs of Racecraft's own"
+            )
         outer = re.sub(r"[^/]+/$", "", model.root)
         if model.root and any(file.startswith(f"{outer}{CUSTOM_FILES}/") for file in source.files):
             model.notes.append(

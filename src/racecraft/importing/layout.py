@@ -79,6 +79,18 @@ def is_plain(name: str) -> bool:
     return all(_PLAIN.fullmatch(part) and not part.endswith(".") for part in name.split("/"))
 
 
+def runs_inside(names: Iterable[str], root: str) -> set[str]:
+    """Folders of Racecraft's runs inside of a model's folder, such as its first import left in ``runs/`` there."""
+    runs = {name.removesuffix(RUN) for name in names if name == RUN or name.endswith(f"/{RUN}")}
+    return set() if is_below(root, runs) else {run for run in runs if run.startswith(root)}
+
+
+def is_below(path: str, folders: set[str]) -> bool:
+    """Whether a path is one of some folders, or lies in one; folders end with a slash."""
+    places = (place for place in range(len(path) + 1) if not place or path[place - 1] == "/")
+    return any(path[:place] in folders for place in places)
+
+
 def is_of_others(name: str) -> bool:
     """Whether a path leads through a folder of deepracer-for-cloud that holds what is of other models."""
     return not set(_FOLDERS_OF_OTHERS).isdisjoint(name.split("/")[:-1])
@@ -95,7 +107,7 @@ def find_root(names: Iterable[str], *, source: str) -> str:
         SourceError: There are several models, or nothing that is understood.
     """
     roots: dict[str, set[str]] = {}  # folder -> what there marks it
-    has_history = False
+    has_history, names = False, list(names)
     for name in names:
         has_history = has_history or role(name) in ("trace", "metrics", "weights", "log")
         for mark in _MARKS:
@@ -110,6 +122,11 @@ def find_root(names: Iterable[str], *, source: str) -> str:
             f"{source} holds nothing that is understood: neither {REWARD} nor {METADATA} nor {RUN_ENV}.",
             hint="Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
         )
+    runs = runs_inside(names, "")
+    originals = {root for root in roots if not is_below(root, runs)}
+    roots = {  # but for runs that were made of the model that lies around them
+        root: marks for root, marks in roots.items() if root in originals or not is_below(root, originals)
+    }
     own = {root: marks for root, marks in roots.items() if not is_of_others(root)} or roots
     trained = [root for root, marks in own.items() if {REWARD, TRAINING_PARAMS} <= marks]
     own = {root: marks for root, marks in own.items() if not _is_bucket(root, marks, trained)}
