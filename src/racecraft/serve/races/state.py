@@ -56,6 +56,8 @@ def state_of(race: Race) -> RaceState:
     moment = now()
     if not race.commitment:
         return "closed"  # nobody can enter what was driven under the old rules
+    if race.over is not None:
+        return "closed"  # where it starts is no secret any more, whatever the clock says now
     if moment < race.opens:
         return "upcoming"
     return "closed" if race.closes is not None and moment >= race.closes else "open"

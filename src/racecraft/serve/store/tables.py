@@ -315,6 +315,8 @@ class Race(Table):
     """What drives the duels of a final, once its organiser has begun it."""
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
+    over: Mapped[datetime | None]
+    """Since when people were told that a league's race is over: it stays so, though a clock be set back."""
     created: Mapped[datetime] = mapped_column(default=now)
     deleted: Mapped[datetime | None]
 

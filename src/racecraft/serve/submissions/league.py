@@ -54,6 +54,7 @@ class League:
         query = query.join(Member, sa.and_(Member.group_id == Race.group_id, Member.user_id == user_id))
         with self._database.transaction() as session:
             rows = session.execute(query.where(Race.deleted.is_(None)).order_by(Race.id.desc())).all()
+        self._note_over(*(row[0] for row in rows))
         return [_info(race, title, "organiser" if role == "organiser" else "racer") for race, title, role in rows]
 
     def get(self, race_id: int, user_id: int | None, *, organiser: bool = False, member: bool = False) -> LeagueRace:
@@ -70,6 +71,7 @@ class League:
         """
         with self._database.transaction() as session:
             race, title, part = seen(session, race_id, user_id)
+        self._note_over(race)
         if (organiser and part != "organiser") or (member and part == "spectator"):
             raise NotFound(f"There is no race {race_id} of {'yours' if organiser else 'a group that you are in'}.")
         return _info(race, title, part)
@@ -172,7 +174,9 @@ class League:
             NotFound: It is not theirs to see.
         """
         with self._database.transaction() as session:
-            return _board(session, race_id, user_id=user_id, top=top)[1:]
+            race, told, board, running = _board(session, race_id, user_id=user_id, top=top)
+        self._note_over(race)
+        return told, board, running
 
     def medals(self, race_id: int) -> Medals | None:
         """What lap times on a race's track are worth in its car, where that is known."""
@@ -195,6 +199,7 @@ class League:
         """
         with self._database.transaction() as session:
             race, _, _ = seen(session, race_id, user_id)
+        self._note_over(race)
         announced = announcement_of(race)
         shown = "" if is_withheld(race) else announced.secret
         return Announcement(document=announced.document, commitment=announced.commitment, secret=shown)
@@ -210,10 +215,22 @@ class League:
             running += _is_driven_again(session, found)
             is_over = race.state == "closed"
             final = {"final": published_final(session, found)} if is_over and race.form != "alone" else {}
+        self._note_over(found)
         announced = replace(announcement_of(found), secret=race.secret).to_dict()
         told = {"title": race.title, "state": race.state, "running": running}
         rows = [vars(row) for row in board.rows] if is_over else []
         return {**told, **announced, "board": [{name: row[name] for name in PUBLISHED} for row in rows], **final}
+
+    def _note_over(self, *races: Race) -> None:
+        """Let races that are about to be told to be over, with what they kept secret, be so for good.
+
+        A clock may be set back afterwards, or have been ahead: what people may know then is no race to enter.
+        """
+        told = [race.id for race in races if race.secret and race.over is None and state_of(race) == "closed"]
+        if told:
+            with self._database.transaction() as session:
+                is_new = sa.and_(Race.id.in_(told), Race.over.is_(None))
+                session.execute(sa.update(Race).where(is_new).values(over=now()))
 
     def track(self, race_id: int) -> tuple[str, Track]:
         """A race's track by its name; it may be its maker's own."""
