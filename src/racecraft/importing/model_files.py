@@ -8,6 +8,7 @@ best and which came last, ``.coach_checkpoint`` the last.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -82,13 +83,16 @@ def find_models(names: Iterable[str]) -> list[ModelFiles]:
             graphs[folder, int(graph[1])] = path
         elif base.endswith(".pb"):
             others.append(ModelFiles(graph=path))
+    whole = {key: paths for key, paths in pairs.items() if len(paths) == 2}
+    num_pairs = Counter(iteration for _, iteration, _ in whole)
+    folders: dict[int, list[str]] = {}
+    for folder, iteration in graphs:
+        folders.setdefault(iteration, []).append(folder)
     numbered = []
-    for (folder, iteration, steps), paths in sorted(pairs.items(), reverse=True):  # the later of two takes the graph
-        if len(paths) != 2:
-            continue
-        there = [place for place in graphs if place[1] == iteration]
-        is_alone = len(there) == 1 and sum(key[1] == iteration and len(pairs[key]) == 2 for key in pairs) == 1
-        graph_path = graphs.pop(there[0] if is_alone else (folder, iteration), "")
+    for (folder, iteration, steps), paths in sorted(whole.items(), reverse=True):  # the later of two takes the graph
+        there = folders.get(iteration, [])
+        is_alone = len(there) == num_pairs[iteration] == 1
+        graph_path = graphs.pop((there[0] if is_alone else folder, iteration), "")
         index, data = paths["index"], paths["data-00000-of-00001"]
         numbered.append(ModelFiles(iteration=iteration, steps=steps, graph=graph_path, index=index, data=data))
     numbered += [ModelFiles(iteration=iteration, graph=path) for (_, iteration), path in graphs.items()]
