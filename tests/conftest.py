@@ -26,6 +26,12 @@ def _arithmetic_stays_as_it_was() -> Iterator[None]:
     assert np.float64(5e-324) * np.float64(1.0) != 0.0, "something left this thread without subnormal numbers"
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _stable_baselines_logs_with_the_tests(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Not in a new folder of the system's temporary ones for every learner."""
+    os.environ["SB3_LOGDIR"] = str(tmp_path_factory.mktemp("sb3"))
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """What is imported to collect tests lives as long as they do: looking through it for garbage costs seconds."""
