@@ -126,6 +126,24 @@ def test_of_two_models_of_one_iteration_the_user_names_one(tmp_path: Path) -> No
             import_run(path)
 
 
+def test_a_checkpoint_that_is_named_or_half_there_is_missed(tmp_path: Path) -> None:
+    said = "The checkpoint 7_Step-70.ckpt is not whole among the files: it begins with fresh weights."
+    base = {**small(), "reward_function.py": models.REWARD}
+    best = json.dumps({"best_checkpoint": {"name": "7_Step-70.ckpt"}, "last_checkpoint": {"name": "9_Step-90.ckpt"}})
+    for number, partial in enumerate(
+        (
+            {"model/.coach_checkpoint": "7_Step-70.ckpt"},
+            {"model/deepracer_checkpoints.json": best},
+            {"model/7_Step-70.ckpt.index": "x", "model/7_Step-70.ckpt.meta": "x"},
+        )
+    ):
+        folder = models.as_folder({**base, **partial}, tmp_path / str(number))
+        assert imported(folder)[0] == ""
+        assert said in imported(folder)[1]
+        assert said not in imported(folder, checkpoint="none")[1]
+    assert not any("not whole" in note for note in imported(models.as_folder(base, tmp_path / "plain"))[1])
+
+
 def test_what_belongs_together_of_the_states_of_a_model() -> None:
     def states(*names: str) -> list[tuple[int, str, str]]:
         return [(model.steps, model.path, model.graph) for model in find_models(names)]

@@ -117,9 +117,12 @@ def choose_model(source: Source, names: Iterable[str], wanted: str, notes: list[
         return None
     if wanted not in (BEST, LAST):
         return _named(models, wanted, source)
-    if not models:
-        return None
     said = _said(source, names)
+    if not models:
+        halves = [half[1] for name in names if (half := _CHECKPOINT.fullmatch(name.rpartition("/")[2]))]
+        if missed := [*(said[which] for which in (wanted, LAST) if which in said), *halves]:
+            notes.append(f"The checkpoint {missed[0]} is not whole among the files: it begins with fresh weights.")
+        return None
     plain = [model for model in models if model.iteration < 0]
     if wanted in said:
         if meant := _of(models, said[wanted]):
