@@ -28,7 +28,12 @@ def run(script, *arguments, is_quiet=True, **environment):
         capture_output=True,
         text=True,
         timeout=240,
-        env={"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "error:::racecraft", **environment},
+        env={
+            "OMP_NUM_THREADS": "1",
+            "PYTHONWARNINGS": "error:::racecraft",
+            "SB3_LOGDIR": os.environ["SB3_LOGDIR"],
+            **environment,
+        },
         check=False,
     )
     assert process.returncode == 0, process.stderr
