@@ -17,20 +17,18 @@ from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Deed, User
 
 TELLING: Final = (
-    *(
-        "title",
-        "is_closed",
-        "member",
-        "members",
-        "model",
-        "reason",
-        "race",
-        "uses",
-        "hours",
-        "scopes",
-        "days",
-        "person",
-    ),
+    "title",
+    "is_closed",
+    "member",
+    "members",
+    "model",
+    "reason",
+    "race",
+    "uses",
+    "hours",
+    "scopes",
+    "days",
+    "person",
 )
 """What is kept of what somebody sends; never a real name, a password or a secret."""
 MAX_TARGET: Final = 200  # characters
