@@ -450,6 +450,13 @@ def test_the_verbs(lines, tmp_path, monkeypatch):
     assert done.exit_code == 0
     assert "progress" in done.stdout
     assert (tmp_path / "replay.png").exists()
+    brief = str(write(tmp_path / "brief.csv", lines[:15]))
+    asked = ["replay", brief, "--track", "oval", "--picture", "asked.png"]
+    with pytest.warns(UserWarning, match="Motion is not compared"):
+        done = CliRunner().invoke(every_verb(), asked)
+    assert "progress" in done.stdout  # what was found is told, though there is nothing to draw
+    assert done.exit_code != 0
+    assert not (tmp_path / "asked.png").exists()
     done = CliRunner().invoke(every_verb(), ["calibrate", path, "--track", "oval", "--output", "my cars/car.json"])
     assert done.exit_code == 0
     assert "car.json" in done.stdout

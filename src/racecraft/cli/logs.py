@@ -61,11 +61,13 @@ def replay(
     result = compare(logs or [], track=track, vehicle=vehicle, reward=source, rows=rows)
     if picture is None and not as_json and result.examples:
         picture = Path("replay.png")
+    if not as_json and not result.examples:
+        text().say_replayed(result, None)  # what was found is not lost for want of something to draw
     if picture is not None:
         draw_comparison(result, picture)
     if as_json:
         print_json({**result.to_dict(), **({"picture": str(picture)} if picture is not None else {})})
-    else:
+    elif result.examples:
         text().say_replayed(result, picture)
 
 
