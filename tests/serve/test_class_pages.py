@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
 from leagues import RunningLeague, ok, running_league
+from schools import RACE
 
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
@@ -160,6 +161,34 @@ def test_a_teacher_renames_a_class_closes_it_and_opens_it_again(
     page.get_by_role("button", name=again).press("Enter")
     expect(button).to_be_focused()
     expect(page.get_by_role("heading", name=new_race)).to_be_visible()
+
+
+def test_who_looks_after_entries_without_a_mouse_is_led_into_the_field_and_back(
+    league: RunningLeague, visit: Visit, entry: bytes
+) -> None:
+    from playwright.sync_api import expect
+
+    group = league.group("Class 7b")
+    pupil = league.join(league.code(group), "Comet")
+    race = ok(league.owner.post(f"/api/groups/{group}/races", json=RACE), 201)["id"]
+    address = f"/api/league/races/{race}/submissions"
+    number = ok(pupil.post(f"{address}?model=rocket", content=entry), 202)["id"]
+    league.console.wait_for(lambda: ok(pupil.get(f"{address}/{number}"))["state"] == "done")
+    page = visit.open(f"/league/{race}")
+    rename, out = page.get_by_role("button", name="Rename: rocket, Comet"), page.get_by_role("button", name="Take out")
+    name = page.get_by_label("What the model is called")
+    rename.press("Enter")
+    expect(name).to_be_focused()
+    name.press("Escape")
+    expect(rename).to_be_focused()
+    out.first.press("Enter")
+    expect(page.get_by_label("Reason, which its owner reads")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(rename).to_be_focused()
+    page.keyboard.press("Enter")
+    name.fill("polite")
+    name.press("Enter")
+    expect(page.get_by_role("button", name="Rename: polite, Comet")).to_be_focused()
 
 
 @needs_axe
