@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -301,6 +302,19 @@ def test_a_taken_name_and_a_failure_half_way_leave_the_other_run_alone(
         import_run(folder, name="other")
     assert content(first.run) == before
     assert [run.name for run in Path("runs").iterdir()] == ["mine"]
+
+
+def test_names_that_are_no_text_are_told_as_some(tmp_path: Path) -> None:
+    folder = models.as_folder({**models.MODEL, "training-simtrace/0-iteration.csv": models.simtrace()}, tmp_path / "m")
+    for name in (b"m\xe4.txt", b"training-simtrace/\xff-iteration.csv", b"\xe4.mp4"):
+        with open(os.path.join(os.fsencode(folder), name), "wb") as file:
+            file.write(b"x")
+    found = import_run(folder, name="x")
+    document = json.loads(json.dumps(found.to_dict(), ensure_ascii=False).encode())
+    assert document["unused"]["m\ufffd.txt (1 bytes)"] == "nothing that is read"
+    assert "training-simtrace/\ufffd-iteration.csv" in document["unused"]
+    kept = json.loads((found.run / "original" / "import.json").read_text())
+    assert kept["unused"] == document["unused"]
 
 
 def test_a_report_is_plain_json(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
-from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean
+from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean, printable
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
@@ -207,7 +207,7 @@ def import_run(
             if rules is not None:
                 write_json(folder.race_rules, rules.to_dict())
             (folder.path / ORIGINAL).mkdir(exist_ok=True)
-            write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": source.title})
+            write_json(folder.path / ORIGINAL / "import.json", {**report.to_dict(), "source": printable(source.title)})
             params = replace(params, world_name=tracks[0].name)
             write_run(folder, settings, tracks, text, metadata, hyperparameters, params, foreign=is_foreign)
         except BaseException as error:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from racecraft.errors import typed
+from racecraft.errors import printable, typed
 from racecraft.importing.layout import Role, role
 from racecraft.importing.source import SourceFile
 
@@ -49,19 +49,23 @@ class ImportedRun:
         return f"racecraft train --resume {typed(self.run)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON."""
+        """As JSON, which cannot hold each name that a file may have."""
         return {
             "run": str(self.run),
-            "kind": self.kind,
+            "kind": printable(self.kind),
             "track": self.track,
-            "used": self.used,
-            "unused": self.unused,
-            "unknown": self.unknown,
+            "used": _plain(self.used),
+            "unused": _plain(self.unused),
+            "unknown": _plain(self.unknown),
             "kept": self.kept,
             "kept_in": self.kept_in,
-            "notes": self.notes,
+            "notes": [printable(note) for note in self.notes],
             "next": self.next_command,
         }
+
+
+def _plain(told: dict[str, str]) -> dict[str, str]:
+    return {printable(what): printable(why) for what, why in told.items()}
 
 
 def unused_files(files: Iterable[SourceFile], root: str) -> dict[str, str]:
