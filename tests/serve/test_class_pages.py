@@ -191,6 +191,23 @@ def test_who_looks_after_entries_without_a_mouse_is_led_into_the_field_and_back(
     expect(page.get_by_role("button", name="Rename: polite, Comet")).to_be_focused()
 
 
+def test_a_window_that_is_older_than_the_end_of_a_class_says_so_and_shows_it(
+    league: RunningLeague, visit: Visit
+) -> None:
+    from playwright.sync_api import expect
+
+    group = league.group("Class 7b")
+    page = visit.open(f"/groups/{group}")
+    page.get_by_role("button", name="Make a code").wait_for()
+    ok(league.owner.patch(f"/api/groups/{group}", json={"is_closed": True}), 204)  # in another window
+    page.get_by_role("button", name="Make a code").click()
+    page.get_by_text("The group is closed.").wait_for()
+    page.get_by_role("button", name="Open the group again").wait_for()
+    expect(page.get_by_role("button", name="Make a code")).to_have_count(0)
+    assert len(visit.complaints) == 1, "of what was refused"
+    visit.complaints.clear()
+
+
 @needs_axe
 def test_the_audit_log_is_read_on_a_phone(league: RunningLeague, visit: Visit) -> None:
     group = league.group("Class 7b, which meets on Fridays")
