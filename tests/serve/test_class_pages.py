@@ -11,6 +11,9 @@ from browsers import Visit, needs_axe, needs_browser, needs_pages, visiting
 from leagues import RunningLeague, ok, running_league
 from schools import RACE
 
+from racecraft.serve.store.database import Database
+from racecraft.serve.store.tables import Job, Submission, now
+
 pytestmark = [pytest.mark.slow, needs_pages, needs_browser]
 
 
@@ -206,6 +209,31 @@ def test_a_window_that_is_older_than_the_end_of_a_class_says_so_and_shows_it(
     expect(page.get_by_role("button", name="Make a code")).to_have_count(0)
     assert len(visit.complaints) == 1, "of what was refused"
     visit.complaints.clear()
+
+
+def test_whose_row_of_a_season_it_is_stays_in_sight_on_a_phone(league: RunningLeague, visit: Visit) -> None:
+    group = league.group("Class 7b")
+    pupil = league.number(league.join(league.code(group), "Comet"))
+    titles = [f"The long night of the oval, part {number}" for number in range(4)]
+    races = [ok(league.owner.post(f"/api/groups/{group}/races", json={**RACE, "title": one}), 201) for one in titles]
+    database = Database(f"sqlite:///{league.console.runs / '.racecraft' / 'console.db'}")
+    with database.transaction() as session:
+        session.add(Job(id="j", kind="judge", run="", state="done", user_id=pupil))
+        session.flush()
+        for race in races:
+            driven = {"score_ms": 9000, "best_lap_ms": 9000, "completion": 1.0, "judged": now()}
+            session.add(Submission(race_id=race["id"], user_id=pupil, job_id="j", digest="d", model="m", **driven))
+    database.close()
+    for race in races:
+        ok(league.owner.patch(f"/api/league/races/{race['id']}", json={"is_over": True}))
+    page = visit.open(f"/groups/{group}/season", width=360, height=740)
+    season = page.get_by_role("region", name="Season")
+    name, last = season.get_by_text("Comet"), season.locator("tbody td").last
+    season.evaluate("one => one.scrollLeft = one.scrollWidth")
+    seen = [one.bounding_box() for one in (season, name, last)]
+    (frame, row, cell) = ((box["x"], box["x"] + box["width"]) for box in seen if box is not None)
+    assert frame[0] <= row[0] < row[1] <= cell[0] < cell[1] <= frame[1] + 1
+    assert visit.overflow() <= 0
 
 
 @needs_axe
