@@ -250,6 +250,25 @@ def test_ppo_can_be_given_whole_but_not_beside_hyperparameters() -> None:
     assert make_plan(ppo=None).settings == make_plan().settings
 
 
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"start": {}}, "start is {}; use racecraft.sim.Start(...)."),
+        ({"sac": {}}, "sac is {}; use racecraft.learn.SACConfig(...)."),
+        ({"distill": {"num_envs": 8}}, "distill is {'num_envs': 8}; use racecraft.learn.DistillConfig(...)."),
+        ({"sb3": 5}, "sb3 is 5; use racecraft.learn.sb3.SB3Config(...)."),
+        ({"sensors": 5}, "sensors is 5; use a list of AWS's sensor names."),
+        ({"sensors": "LIDAR"}, "sensors is 'LIDAR'; use a list of AWS's sensor names."),
+        ({"aws_log": 5}, "aws_log is 5; use a file's path, or '-'."),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(tmp_path: Path, given: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError) as refusal:
+        train("oval", root=tmp_path / "runs", **given)
+    assert str(refusal.value) == says
+    assert not (tmp_path / "runs").exists()
+
+
 def test_a_seed_of_numpy_s_is_a_number_that_json_knows() -> None:
     seed = make_plan(seed=np.int64(7)).settings.seed
     assert (seed, type(seed)) == (7, int)

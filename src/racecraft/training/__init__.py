@@ -94,10 +94,12 @@ def train(
     """
     import time
 
+    from racecraft.checks import check_type
     from racecraft.training.job import Training
     from racecraft.training.plan import make_plan
     from racecraft.training.recipes import with_recipe
 
+    check_type("aws_log", aws_log, (str, Path, type(None)), "use a file's path, or '-'")
     started = time.monotonic() if started is None else started
     given = {"track": track, "reward": reward, "until": until, "actions": actions, **settings}
     plan = make_plan(

@@ -152,6 +152,7 @@ def _metadata(
     """What the policy sees and does: as a file says, or the parent, or what suits the kind of training."""
     if file is not None:
         return _with_algorithm(ModelMetadata.load(file), algorithm)
+    check_type("sensors", sensors, (list, tuple), "use a list of AWS's sensor names")
     space = action_space(actions) if isinstance(actions, str) else actions
     if parent is not None:
         made = parent.folder.read_model_metadata()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final
@@ -50,6 +50,15 @@ _ADDED: Final = ("algorithm", "opponents", "sac", "distill", "sb3", "device", "c
 _DROPPED: Final = (("growth_steps", 0),)
 """Settings of PPO that runs of earlier versions have, with the value that meant nothing."""
 CRITICS: Final = ("privileged", "lap", "camera")
+_KINDS: Final[Mapping[str, tuple[type, str]]] = {
+    "objects": (Objects, "racecraft.sim"),
+    "start": (Start, "racecraft.sim"),
+    "ppo": (PPOConfig, "racecraft.learn"),
+    "sac": (SACConfig, "racecraft.learn"),
+    "distill": (DistillConfig, "racecraft.learn"),
+    "sb3": (SB3Config, "racecraft.learn.sb3"),
+}
+"""What settings that are dataclasses are, and where to take them from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +129,8 @@ class TrainSettings:
         ):
             check_whole(name, value, low, high, is_plain=True)
         self.randomize.check(self.vehicle, CAMERAS[self.camera])
-        check_type("objects", self.objects, Objects, "use racecraft.sim.Objects(...)")
+        for name, (kind, room) in _KINDS.items():
+            check_type(name, getattr(self, name), kind, f"use {room}.{kind.__name__}(...)")
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
