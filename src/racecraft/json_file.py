@@ -126,9 +126,11 @@ def write_json_object(path: str | Path, document: Mapping[str, Any]) -> None:
     """Write a document as AWS's console does: UTF-8, two spaces.
 
     Raises:
-        ConfigError: The file cannot be written.
+        ConfigError: It is no path, or the file cannot be written.
     """
     try:
+        if not isinstance(path, str | os.PathLike):
+            raise OSError(errno.EINVAL, "it is no path")
         Path(path).write_text(json.dumps(document, indent=2), encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path} cannot be written: {error.strerror or error}.") from error

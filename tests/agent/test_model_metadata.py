@@ -9,6 +9,7 @@ from racecraft.agent import (
     PRESETS,
     ContinuousActionSpace,
     DiscreteActionSpace,
+    Hyperparameters,
     LidarConfig,
     ModelMetadata,
     action_space,
@@ -335,3 +336,10 @@ def test_what_is_no_action_space_and_no_list_of_sensors_is_told(settings, words)
 def test_save_says_why_it_cannot(tmp_path):
     with pytest.raises(ConfigError, match="cannot be written: No such file"):
         ModelMetadata().save(tmp_path / "none" / "model_metadata.json")
+
+
+@pytest.mark.parametrize("settings", [ModelMetadata(), Hyperparameters()])
+def test_what_is_no_path_is_not_written_to(settings):
+    for path in (5, None, ["a"]):
+        with pytest.raises(ConfigError, match=r" cannot be written: it is no path\.$"):
+            settings.save(path)

@@ -356,6 +356,7 @@ def test_settings_that_are_not_allowed(settings: dict[str, Any], says: str) -> N
         ({"settings": 5}, "settings is 5; allowed is a dict of names and values"),
         ({"settings": {5: 1}}, "settings is {5: 1}; allowed is a dict of names and values"),
         ({"make": ["is_slippery"]}, r"make is \['is_slippery'\]; allowed is a dict of names and values"),
+        ({"on_progress": 5}, "on_progress is 5; allowed is a function of one Progress"),
     ],
 )
 def test_arguments_of_another_kind_are_told(given: dict[str, Any], says: str) -> None:
@@ -367,6 +368,8 @@ def test_what_is_no_run_to_go_on_with_is_told() -> None:
     for ask in (resume, recall):
         with pytest.raises(ConfigError, match=r"run is 5; use the path of a run's folder"):
             ask(5)  # type: ignore[operator]
+    with pytest.raises(ConfigError, match="on_progress is 5; allowed is a function of one Progress"):
+        resume("runs/none", on_progress=5)  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="environment is None; use an id of Gymnasium"):
         default_algorithm(None)  # type: ignore[arg-type]
 

@@ -11,6 +11,7 @@ import pytest
 from racecraft.errors import ConfigError, RewardError
 from racecraft.fidelity import calibrate, fit_frame, replay
 from racecraft.fidelity.given import log_files, track_of, vehicle_of
+from racecraft.fidelity.rules import TrackRules
 from racecraft.sim import load_vehicle
 from racecraft.track import load_track
 
@@ -73,3 +74,8 @@ def test_a_fit_says_it_too(given: dict[str, Any], says: str) -> None:
 def test_a_frame_is_a_file() -> None:
     with pytest.raises(ConfigError, match=r"frame is 5; use a picture's path\."):
         fit_frame(5, track="oval")  # type: ignore[arg-type]
+
+
+def test_rules_are_those_of_a_track_and_not_of_its_name() -> None:
+    with pytest.raises(ConfigError, match=r"^track is 'oval'; get one with load_track\(name or path\)\.$"):
+        TrackRules("oval")  # type: ignore[arg-type]

@@ -10,12 +10,13 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from archives_made import FILES, make_tar, make_zip, member, read
 
-from racecraft.errors import ArchiveError
+from racecraft.errors import ArchiveError, ConfigError
 from racecraft.importing.archive import read_archive
 from racecraft.importing.archive_guard import Guard, Limits
 
@@ -310,3 +311,9 @@ def test_members_of_a_zip_that_share_bytes(tmp_path: Path) -> None:
     longer = data[: first + 20] + struct.pack("<2L", 180, 180) + data[first + 28 :]
     with pytest.raises(ArchiveError, match="share bytes"):
         read(longer, tmp_path)
+
+
+@pytest.mark.parametrize("path", [5, None, b"model.tar.gz"])
+def test_what_is_no_path_is_told(path: Any) -> None:
+    with pytest.raises(ConfigError, match=r"^path is .*; use the path of an archive\.$"):
+        next(read_archive(path))

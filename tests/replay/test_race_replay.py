@@ -82,6 +82,14 @@ def test_what_was_driven_is_driven_again_to_the_bit(evaluation: Evaluation) -> N
         assert verify(Replay.of(evaluation), num_threads=num_threads).difference is None
 
 
+def test_what_is_no_replay_and_no_path_is_not_written(clean: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"^replay is 5; make one with Replay\.of\(evaluation\)\.$"):
+        write_replay(5, tmp_path / "five.replay")  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match=r"^path is 5; use a file's path\.$"):
+        write_replay(read_replay(clean), 5)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_was_read_cannot_be_changed_by_mistake_and_is_told_as_genuine(clean: Path) -> None:
     replay = read_replay(clean)
     assert not any(car.recording.rows.flags.writeable for car in replay.cars)

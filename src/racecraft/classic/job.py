@@ -136,7 +136,8 @@ def learn(
         on_progress: Called after every evaluation.
 
     Raises:
-        ConfigError: There is no such environment, algorithm or setting, or they do not fit each other.
+        ConfigError: There is no such environment, algorithm or setting, they do not fit each other, or `on_progress`
+            cannot be called.
         RunError: The folder cannot be made.
         TrainingError: The numbers have left all bounds.
     """
@@ -144,6 +145,7 @@ def learn(
     for what, given in (("settings", settings), ("make", make)):
         is_named = isinstance(given, Mapping) and all(isinstance(key, str) for key in given)
         require(what, given, given is None or is_named, "a dict of names and values")
+    _check_callable(on_progress)
     recipe = find_recipe(environment, algorithm)
     goal = Goal.parse(until) if until else Goal(mean_return=recipe.goal)
     chosen = recipe.settings.changed(settings or {})
@@ -176,8 +178,9 @@ def resume(run: str | Path, *, until: str = "", on_progress: Callable[[Progress]
 
     Raises:
         RunError: The folder holds nothing of the kind.
-        ConfigError: Its environment cannot be made.
+        ConfigError: Its environment cannot be made, or `on_progress` cannot be called.
     """
+    _check_callable(on_progress)
     lesson, arrays, steps = load(run)
     folder = Path(run)
     goal = Goal.parse(until) if until else Goal()
@@ -188,6 +191,10 @@ def resume(run: str | Path, *, until: str = "", on_progress: Callable[[Progress]
         room.curve = read_curve(folder)
         every = find_recipe(lesson.environment, lesson.algorithm).evaluate_every
         return room.learn(goal, every, folder, on_progress)
+
+
+def _check_callable(on_progress: object) -> None:
+    require("on_progress", on_progress, on_progress is None or callable(on_progress), "a function of one Progress")
 
 
 def recall(run: str | Path) -> tuple[Lesson, Policy]:

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type
 from racecraft.errors import RunError
 from racecraft.fidelity.differences import why_end, why_wheels
 from racecraft.sim.columns import ROW_COLUMNS, STATUS_NAMES
 from racecraft.sim.logged import LogJudge
+from racecraft.track.track import Track
 
 if TYPE_CHECKING:
     from racecraft.fidelity.differences import Differences
     from racecraft.fidelity.logs import Log
-    from racecraft.track.track import Track
 
 PROGRESS_TOLERANCE: Final = 1e-5
 """Fraction of a lap: 0.001 %."""
@@ -29,9 +30,14 @@ _OVER: Final = [STATUS_NAMES.index(name) for name in ("lap_complete", "off_track
 
 
 class TrackRules:
-    """The rules on one track. Each episode of a log may have been driven forward or in reverse."""
+    """The rules on one track. Each episode of a log may have been driven forward or in reverse.
+
+    Raises:
+        ConfigError: It is no track.
+    """
 
     def __init__(self, track: Track) -> None:
+        check_type("track", track, Track, "get one with load_track(name or path)")
         self.track = track
         self._judges = (LogJudge(track), LogJudge(track, reversed=True))
         self._waypoints = (track.waypoints, track.reversed().waypoints)

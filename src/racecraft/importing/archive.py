@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Final
 
+from racecraft.checks import check_type
 from racecraft.errors import ArchiveError
 from racecraft.importing.archive_guard import Guard, Limits, Member
 from racecraft.importing.tar_reader import read_tar
@@ -35,9 +36,11 @@ def read_archive(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> Iterat
     """The files of a tar, tar.gz or zip archive, in the archive's order.
 
     Raises:
+        ConfigError: It is no path.
         ArchiveError: Not readable, of another kind, damaged, or with anything in it that a download of a model does not
             have: names that lead elsewhere, links, devices, bombs. What was read until then is not to be believed.
     """
+    check_type("path", path, (str, os.PathLike), "use the path of an archive")
     path = Path(path)
     with _opened(path, limits) as file:
         start = file.read(512)

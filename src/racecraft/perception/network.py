@@ -6,6 +6,7 @@ pictures ──observe──▶ observations ──native core──▶ outputs 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
-from racecraft.errors import CheckpointError, RunError
+from racecraft.checks import check_type, check_whole, shown
+from racecraft.errors import CheckpointError, RunError, ShapeError
 from racecraft.json_file import open_regular
 from racecraft.learn.native_regressor import NativeRegressor
 from racecraft.learn.networks import PERCEIVER
@@ -46,10 +48,13 @@ class Perceiver:
         num_threads: 0 takes every core. Results are the same for any number.
 
     Raises:
+        ConfigError: The seed or the number of threads is none.
         CheckpointError: The file is missing, damaged, or not of this network.
     """
 
     def __init__(self, weights: Path | None = WEIGHTS, *, seed: int = 0, num_threads: int = 0) -> None:
+        check_whole("seed", seed, 0, 2**63 - 1)
+        check_whole("num_threads", num_threads, 0, 1024)
         self.network = NativeRegressor(
             PERCEIVER, NUM_OUTPUTS, seed=seed if weights is None else None, num_threads=num_threads
         )
@@ -83,16 +88,20 @@ class Perceiver:
         Raises:
             ShapeError: They are not uint8 (N, 120, 160).
         """
+        if not isinstance(frames, np.ndarray):
+            raise ShapeError(f"frames are {shown(frames)}, expected an array of uint8, (N, 120, 160).")
         return of_one_brightness(self.network.encode(frames))
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | Path) -> None:
         """Replace a file of weights by these.
 
         Raises:
+            ConfigError: It is no path.
             RunError: It cannot be written; an older one is still whole.
         """
+        check_type("path", path, (str, PathLike), "use a file's path")
         try:
-            write_file(path, save_tensors(self._kept()))
+            write_file(Path(path), save_tensors(self._kept()))
         except OSError as error:
             raise RunError(f"{path} cannot be written: {error.strerror or error}.") from error
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from racecraft.checks import check_type
 from racecraft.errors import ConfigError, RacecraftError, ReplayError, printable
 from racecraft.json_file import read_bytes
 from racecraft.race.announcement import Announcement
@@ -107,9 +109,11 @@ def write_replay(replay: Replay, path: str | Path) -> Path:
     """Write a replay file; equal replays give equal bytes.
 
     Raises:
+        ConfigError: It is no replay, or the path is none.
         ReplayError: It is too long, or holds a number that is NaN or infinite.
         OSError: The file cannot be written.
     """
+    check_type("path", path, (str, PathLike), "use a file's path")
     write_file(Path(path), pack_replay(replay))
     return Path(path)
 
@@ -118,8 +122,10 @@ def pack_replay(replay: Replay) -> bytes:
     """A replay as the bytes of its file.
 
     Raises:
+        ConfigError: It is no replay.
         ReplayError: It is too long, or holds a number that is NaN or infinite.
     """
+    check_type("replay", replay, Replay, "make one with Replay.of(evaluation)")
     track = replay.conditions.track
     if sum(car.recording.rows.size for car in replay.cars) > MAX_CELLS:
         raise ReplayError(f"The race is too long for a replay file: more than {MAX_CELLS:,} numbers.")
