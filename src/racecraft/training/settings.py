@@ -129,8 +129,8 @@ class TrainSettings:
         ):
             check_whole(name, value, low, high, is_plain=True)
         self.randomize.check(self.vehicle, CAMERAS[self.camera])
-        for name, (kind, room) in _KINDS.items():
-            check_type(name, getattr(self, name), kind, f"use {room}.{kind.__name__}(...)")
+        for name, (config, room) in _KINDS.items():
+            check_type(name, getattr(self, name), config, f"use {room}.{config.__name__}(...)")
         kind, _, number = self.device.partition(":") if isinstance(self.device, str) else ("", "", "")
         if self.device != "cpu" and (kind != "cuda" or (":" in self.device and not number.isdecimal())):
             raise ConfigError(f"device is {self.device!r}; allowed are 'cpu', 'cuda', and 'cuda:1' for the second GPU.")
