@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
+from racecraft.car.calibration import load_calibration
+
 
 def test_export(racecraft: Run, trained: Path) -> None:
     outcome = racecraft("export", str(trained), "--to", "car", "--output", "floor.tar.gz")
@@ -66,6 +68,12 @@ def test_a_car_is_measured_and_driven(racecraft: Run, trained: Path) -> None:
     assert "as_car" not in racecraft("evaluate", str(trained), *driving[2:]).document
 
 
+def test_a_car_is_written_into_a_folder_that_is_not_there_yet(racecraft: Run, tmp_path: Path) -> None:
+    file = tmp_path / "our cars" / "2026" / "rot.json"
+    assert racecraft("car", "calibrate", "--slider", "50", "-o", str(file)).status == 0
+    assert load_calibration(file).slider_percent == 50.0
+
+
 def test_of_a_car_that_is_too_fast_it_is_said_what_the_simulator_drives(racecraft: Run) -> None:
     told = [racecraft("car", "calibrate", "--speed", speed).out for speed in ("60=4.1", "60=4.0")]
     assert ["The simulator drives 4 m/s at most" in text for text in told] == [True, False]
@@ -80,7 +88,7 @@ def test_of_a_car_that_is_too_fast_it_is_said_what_the_simulator_drives(racecraf
         (["car", "calibrate", "--servo", "1.2,1.7"], 2, "expected 3 numbers with ',' between them"),
         (["car", "calibrate", "--servo", "nan,nan,nan"], 1, "servo is nan"),
         (["car", "calibrate", "--circle-left", "0.1"], 1, "A circle of 0.1 m to the left"),
-        (["car", "calibrate", "--slider", "50", "-o", "no/where/car.json"], 1, "cannot be written"),
+        (["car", "calibrate", "--slider", "50", "-o", "/dev/null/car.json"], 1, "cannot be written"),
         (["evaluate", "RUN", "--as", "crr"], 1, "Did you mean 'car'?"),
         (["evaluate", "RUN", "--as", "car", "--tracks", "oval"], 2, "--as does not go with --tracks"),
         (["evaluate", "RUN", "--as", "car", "--checkpoint", "77"], 1, "77"),

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from racecraft import __version__
+from racecraft.errors import ConfigError
 
 app = typer.Typer(
     name="racecraft",
@@ -46,6 +47,18 @@ def root(
         raise typer.Exit
     if context.invoked_subcommand is None:
         context.fail("Missing command.")
+
+
+def make_folder_of(file: Path) -> None:
+    """Make the folder that a file is to be written into: what was measured or fitted is not lost for want of one.
+
+    Raises:
+        ConfigError: It cannot be made.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be written: {error.strerror or error}.") from error
 
 
 def model_of(context: typer.Context, run: Path, checkpoint: str) -> tuple[Path, str]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from racecraft.cli.app import Json, app, print_json
+from racecraft.cli.app import Json, app, make_folder_of, print_json
 
 car_app = typer.Typer(help="What was measured on a physical car.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(car_app, name="car")
@@ -56,6 +56,7 @@ def calibrate(
         slider=slider,
         latency=latency,
     )
+    make_folder_of(output)
     car.save(output)
     if as_json:
         print_json({"file": str(output), **asdict(car)})

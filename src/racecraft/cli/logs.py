@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from racecraft.cli.app import Json, TrackOption, app, is_given, print_json, text
+from racecraft.cli.app import Json, TrackOption, app, is_given, make_folder_of, print_json, text
 from racecraft.errors import ConfigError
 
 OF_LOGS: Final = ("reward", "vehicle", "rows")
@@ -99,10 +99,7 @@ def calibrate(
     from racecraft.fidelity import calibrate as fit
 
     result = fit(logs, vehicle=vehicle, track=track or None)
-    try:  # a fit takes minutes: it is not lost for want of a folder
-        output.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"{output} cannot be written: {error.strerror or error}.") from error
+    make_folder_of(output)
     result.vehicle.save(output)
     if as_json:
         print_json({**result.to_dict(), "file": str(output)})
