@@ -88,8 +88,9 @@ def test_all_that_is_of_the_sensor_kit_is_named() -> None:
 def test_what_the_car_cannot_do_is_refused() -> None:
     with pytest.raises(ConfigError, match="does not know the sensor DISCRETIZED_SECTOR_LIDAR"):
         car_metadata(*of(action_space("default"), (*FRONT, "DISCRETIZED_SECTOR_LIDAR")))
-    with pytest.raises(ConfigError, match="No action steers"):
+    with pytest.raises(ConfigError, match="No action steers") as told:
         car_metadata(*of(table((0, 1), (0, 2))))
+    assert "--actions default" in told.value.hint
 
 
 NOTES = {

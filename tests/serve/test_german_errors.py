@@ -17,11 +17,14 @@ GERMAN = ROOT / "web/src/i18n/de/errors.json"
 PLACES = (
     *("serve", "reward/aside.py", "reward/check.py", "reward/imports.py", "reward/worker_process.py", "checks.py"),
     "track/validate.py",
-    *("track/sketch.py", "track/readers.py", "track/generator.py", "agent/model_metadata.py"),
+    *("track/sketch.py", "track/readers.py", "track/generator.py"),
+    *("agent/model_metadata.py", "agent/metadata_file.py", "agent/hyperparameters.py"),
+    *("car/command.py", "car/metadata.py", "car/evaluation.py"),
     *("importing", "sim/objects.py", "training/stop.py", "training/parent.py", "training/start.py"),
     *("training/settings.py", "learn/ppo.py", "learn/sac.py", "learn/distill.py", "learn/saliency.py"),
-    *("run/checkpoint.py", "run/lock.py", "run/stretches.py", "race/entry.py", "race/entry_file.py", "race/policy.py"),
-    *("race/rules.py", "contest", "film", "judging/trained.py", "judging/evaluation.py", "judging/demonstration.py"),
+    *("run/checkpoint.py", "run/folder.py", "run/lock.py", "run/stretches.py"),
+    *("race/entry.py", "race/entry_file.py", "race/policy.py", "race/rules.py", "contest", "film"),
+    *("judging/trained.py", "judging/evaluation.py", "judging/demonstration.py"),
     *("replay", "json_file.py", "analysis/share.py", "run/simtrace.py", "run/metrics.py", "run/judged.py"),
     *("run/training_params.py", "sim/randomization.py", "sim/vehicle.py", "sim/parameter_file.py"),
     *("reward/sandbox/confinement.py", "sweeping/plan.py", "tuning/space.py", "tuning/start.py"),
@@ -46,7 +49,8 @@ OPERATORS = (
 REPORTS = (
     *("importing/importer.py", "importing/job.py", "importing/drfc.py", "importing/env_file.py", "importing/own.py"),
     *("importing/report.py", "importing/weights.py", "importing/model_files.py"),
-    *("agent/hyperparameters.py", "agent/model_metadata.py", "agent/aws_file.py", "car/metadata.py"),
+    *("agent/hyperparameters.py", "agent/metadata_file.py", "agent/model_metadata.py", "agent/aws_file.py"),
+    "car/metadata.py",
     *("training/plan.py", "training/parent.py"),
 )
 """Where what a page tells of an import, of a car, or of what a training begins with, comes from."""
@@ -101,6 +105,16 @@ def said_in(path: Path) -> Iterator[str]:
                 yield text
 
 
+def allowed_in(path: Path) -> Iterator[str]:
+    """What the fields of one of AWS's files may be, with gaps for numbers; two numbers alone are in the sentence."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        match node:
+            case ast.Call(func=ast.Name(id="Field"), keywords=words):
+                texts = filter(None, (sentence(word.value) for word in words if word.arg == "description"))
+                gaps = (re.sub(r"\d[\d.]*", "{}", text) for text in texts)
+                yield from (text for text in gaps if text.strip("{}' ") != "to")
+
+
 def name_of(node: ast.expr) -> str:
     """Of a variable, an attribute, or of the table that something is an entry of."""
     match node:
@@ -144,7 +158,9 @@ def test_every_error_that_a_page_can_show_is_said_in_german() -> None:
     assert len(said) > 300
     told = {text: SOURCES / place for place in REPORTS for text in told_in(SOURCES / place)}
     assert len(told) > 60
-    said.update(told)
+    allowed = {text: SOURCES / place for place in REPORTS for text in allowed_in(SOURCES / place)}
+    assert len(allowed) > 20
+    said.update(told | allowed)
     missing = [f"{path.relative_to(ROOT)}: {text}" for text, path in sorted(said.items()) if text not in german]
     assert missing == []
 
@@ -163,7 +179,7 @@ def test_nothing_is_translated_that_nobody_says() -> None:
     nodes = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.expr))
     spoken = "\n".join(text for node in nodes if (text := sentence(node)))
     put_together = re.compile(
-        r"\{\}: .*|(You have|All the) .* (used up|more)\.|\{\} is \{\}; .*|did not (load|return).*"
+        r"\{\}: .*|(You have|All the) .* (used up|more)\.|\{\} is (\{\}|missing); .*|did not (load|return).*"
     )
     for english in json.loads(GERMAN.read_text()):
         if not put_together.fullmatch(english):

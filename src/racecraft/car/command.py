@@ -55,7 +55,10 @@ def largest(space: ActionSpace) -> tuple[float, float]:
     """
     angle, speed = np.abs(listed_choices(space)).max(axis=0).tolist()
     if angle == 0.0:
-        raise ConfigError("No action steers: a car divides by the largest steering angle.")
+        raise ConfigError(
+            "No action steers: a car divides by the largest steering angle.",
+            hint="Train with an action space in which an action steers, such as --actions default.",
+        )
     return angle, speed
 
 

@@ -77,5 +77,6 @@ def _refuse_others(path: Path, start: bytes) -> None:
     for magic, kind in _OTHERS.items():
         if start.startswith(magic):
             raise ArchiveError(
-                f"{path.name} is a {kind} archive; tar, tar.gz and zip are read.", hint="Unpack it, import the folder."
+                f"{path.name} is an archive of the kind {kind}; tar, tar.gz and zip are read.",
+                hint="Unpack it, import the folder.",
             )
