@@ -116,3 +116,27 @@ def test_a_result_is_said_of_the_track_that_it_was_on(page: Page) -> None:
     expect(said).to_have_text("Las Vegas 2018: Die Belohnungsfunktion ist gescheitert.")
     page.get_by_role("combobox", name="Strecke").select_option("reinvent_2018")
     expect(said).to_have_text("Die Belohnungsfunktion ist gescheitert.")
+
+
+def test_what_the_car_saw_on_another_track_is_gone_with_it(page: Page) -> None:
+    drawn = """([canvas]) => {
+        const { width, height } = canvas;
+        return canvas.getContext("2d").getImageData(0, 0, width, height).data.some((value) => value > 0);
+    }"""
+    seen = page.get_by_label("Was das Auto sieht")
+
+    def wait_for_a_picture(is_there: bool) -> None:
+        for _ in range(PATIENCE // 100):
+            if seen.evaluate_all(drawn) == is_there:
+                return
+            page.wait_for_timeout(100)
+        raise AssertionError("there is a picture" if not is_there else "there is no picture")
+
+    page.get_by_label("Wofür es belohnt wird").select_option("centerline")
+    page.get_by_role("button", name="Trainieren", exact=True).click()
+    wait_for_a_picture(True)
+    page.get_by_role("button", name="Anhalten").click()
+    page.get_by_role("button", name="Trainieren", exact=True).wait_for()
+    wait_for_a_picture(True)
+    page.get_by_role("combobox", name="Strecke").select_option("hairpin")
+    wait_for_a_picture(False)

@@ -82,6 +82,7 @@ export class Lesson {
   painting = $state.raw<RewardPainting | undefined>(); // of the reward that was asked for last
   private readonly workers: Partial<Record<Kind, Worker>> = {};
   private running: Kind = "plain";
+  private isShown = false; // a car until somebody trains; of one that is not, a last picture may still be on its way
   private asked: Asked | undefined;
   private questions = 0; // so far
   private painted = 0; // the question whose painting is waited for
@@ -125,9 +126,17 @@ export class Lesson {
   /** Until somebody trains, a car that has learned already drives; not for who wants nothing to move. */
   show(track: TrackFile): void {
     if (this.isRunning) return;
-    [this.look, this.picture] = [undefined, undefined]; // also the cars of a training that is over
+    this.hide();
     if (this.state !== "ready" || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    this.isShown = true;
     this.workers.plain!.postMessage({ kind: "show", plan: this.plan, track } satisfies Show);
+  }
+
+  /** Of a track that is not the chosen one any more: the car that drives there, also of a training that is over. */
+  hide(): void {
+    if (this.isRunning) return;
+    [this.look, this.picture, this.isShown] = [undefined, undefined, false];
+    this.workers.plain!.postMessage({ kind: "hide" } satisfies Hide);
   }
 
   /** What is wrong with a reward function, among the objects of a race; what does not answer is ended. While the worker trains, the question waits. */
@@ -279,7 +288,7 @@ export class Lesson {
         [this.isSlow, this.threads, this.state] = [report.isSlow, report.threads, "learning"];
         break;
       case "look":
-        if (kind === this.running && this.state !== "loading")
+        if (kind === this.running && (this.state === "learning" || (this.isShown && !this.isRunning)))
           [this.look, this.picture] = [report.look, report.picture];
         break;
       case "iteration": {
