@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -42,9 +42,27 @@ Ghosts = Annotated[
 Positions = Annotated[str, typer.Option("--positions", help="Fixed places, lap and lane of each: '0.23,-1;0.46,1'.")]
 
 
+_OF_MODELS: Final = ("head-to-head", "head-to-model", "grid")
+"""Of models against each other: how one trains for it, and what it is called where it is held."""
+
+
 def kind_of(race: str) -> str:
     """Our spelling of a race's type; AWS's is understood, too."""
     return race.lower().replace("_", "-")
+
+
+def check_race(name: str, allowed: Iterable[str], *, hint: str, what: str = "Race type") -> None:
+    """Refuse a race that there is not; `hint` leads from a name of a race of models, which verbs call differently.
+
+    Raises:
+        ConfigError: Says what is allowed.
+    """
+    from racecraft.checks import check_choice
+
+    try:
+        check_choice(what, name, allowed)
+    except ConfigError as error:
+        raise ConfigError(str(error), hint=hint if name in _OF_MODELS else error.hint) from None
 
 
 def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race") -> Objects:
@@ -53,9 +71,10 @@ def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race")
     Raises:
         ConfigError: An option does not go with the race, or has no meaning.
     """
-    from racecraft.sim.objects import objects_for_race, parse_positions
+    from racecraft.sim.objects import RACE_TYPES, objects_for_race, parse_positions
 
     name = kind_of(race) or "time-trial"
+    check_race(name, RACE_TYPES, hint="racecraft race RUN OTHER --type head-to-model has models race each other.")
     placement, positions, count = options["placement"], options["positions"], options["objects"] or options["bots"]
     for name_given, is_given, needed in (
         ("--objects", options["objects"] != 0, "object-avoidance"),
@@ -94,11 +113,10 @@ def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str
     Raises:
         ConfigError: There is no such race, or an option does not go with it, or has no meaning.
     """
-    from racecraft.checks import check_choice
     from racecraft.sim.objects import RACE_TYPES
 
     name = kind_of(race)
-    check_choice("Race type", name, (*RACE_TYPES, "head-to-head"))
+    check_race(name, (*RACE_TYPES, "head-to-head"), hint="Train for it with --race head-to-head.")
     for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars != 0)):
         if is_given and name != "head-to-head":
             raise ConfigError(f"{option} goes with --race head-to-head; the race is {name}.")

@@ -151,7 +151,7 @@ def ladder(
         laps=laps,
         rules=rules,
         changes={"time_limit": time_limit},
-        objects=_objects(kind, context.params),
+        objects=_objects(kind, context.params, is_ladder=True),
         vehicle=vehicle,
         randomize=randomize,
         seed=seed,
@@ -260,11 +260,18 @@ def _tell(found: _V, say: Callable[[_V], None], *, as_json: bool) -> None:
         raise typer.Exit(1)
 
 
-def _objects(kind: str, options: Mapping[str, Any]) -> Objects:
+def _objects(kind: str, options: Mapping[str, Any], *, is_ladder: bool = False) -> Objects:
     """Those of the race's type; on a road that models share there are none unless boxes or bots are asked for."""
-    from racecraft.contest.terms import TOGETHER
+    from racecraft.contest.ladder import LADDER_KINDS
+    from racecraft.contest.terms import RACE_KINDS, TOGETHER
 
     name = race_options.kind_of(kind)
+    race_options.check_race(
+        name,
+        LADDER_KINDS if is_ladder else RACE_KINDS,
+        hint="Two models on one road are --type head-to-model; head-to-head is how one trains for it.",
+        what="Race type of a ladder" if is_ladder else "Race type",
+    )
     if name in TOGETHER:
         name = "object-avoidance" if options["objects"] else "head-to-bot" if options["bots"] else "time-trial"
     return race_options.objects_of(name, options, option="--type")
