@@ -177,7 +177,11 @@ def _rows(document: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
             row = _together(_checked(common, "all"), words, varied)
             full = sanitize_name("-".join(filter(None, (name, *map(_short, choice)))) or "plain")[:40]
             if full in rows:
-                raise ConfigError(f"Two settings would be called {full!r}.", hint="Give them names under [settings].")
+                raise ConfigError(
+                    f"Two settings would be called {full!r}.",
+                    hint="Give them names under [settings] that differ in their first 40 characters: letters, digits, "
+                    "dots, hyphens and underscores, as they become names of folders.",
+                )
             rows[full] = row
     return rows
 
@@ -244,7 +248,7 @@ def _plan(words: Mapping[str, Any], resolve: Callable[[str, Any], Any], load: Ca
     numbers = words.get(NUMBERS, {})
     constants = find_constants(plan.reward)
     known = (*constants, *HYPERPARAMETERS)
-    _check_names(numbers, known, "The reward and ppo", meant=WORDS)  # a misspelt word of [vary] is taken for a number
+    _check_names(numbers, known, "The list of numbers", meant=WORDS)  # a misspelt word of [vary] is taken for a number
     if (learning := {name: value for name, value in numbers.items() if name not in constants}) and (
         plan.settings.algorithm != "ppo"
     ):
