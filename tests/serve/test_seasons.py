@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import hashlib
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy.orm import Session
 
+from racecraft.serve.finals.finals import Finals
+from racecraft.serve.finals.tasks import count
 from racecraft.serve.store.database import Database
-from racecraft.serve.store.tables import Finalist, Group, Job, Race, Submission, User, now
+from racecraft.serve.store.tables import Finalist, Group, Job, Member, Race, Submission, User, now
 from racecraft.serve.submissions.finalists import board_of
 from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.season import PUBLIC_RACES, SeasonStanding, read_season
+from racecraft.serve.tracks.courses import Courses
 from racecraft.sim.vehicle import load_vehicle
 
 NAMES = tuple(f"Racer {number:02}" for number in range(13))
@@ -132,6 +136,31 @@ def test_a_final_that_is_driven_once_more_says_that_its_board_is_not_the_last(da
         with database.transaction() as session:
             session.get_one(Job, "f").state = state
         assert league.published(number, user_id=None)["running"] == running, state
+
+
+def test_until_a_final_has_been_driven_once_more_its_last_places_count(database: Database, tmp_path: Path) -> None:
+    with database.transaction() as session:
+        session.add_all(User(id=10 + number, name=NAMES[number], handle=NAMES[number]) for number in range(2))
+        session.add_all([Group(id=1, title="ours"), Job(id="j", kind="judge", run="", state="done")])
+        session.flush()
+        session.add(Member(group_id=1, user_id=10, role="organiser"))
+        final = final_of_two(session)
+        final.document = {**final.document, "vehicle": vars(load_vehicle("v5"))}
+        number = final.id
+    league = League(database, lambda _: pytest.fail("nobody asks for a track"))
+    finals = Finals(database, tmp_path, lambda _: Courses(tmp_path), league)
+    as_it_was = [(1, 25, 1, 1), (0, 18, 1, 0)]
+    for state in ("failed", "failed", "running"):
+        finals.hold(number, user_id=10)
+        with database.transaction() as session:
+            assert told(read_season(session, 1)) == as_it_was, "it is queued"
+            job = session.get_one(Job, session.get_one(Race, number).final_job_id)
+            job.state = state
+            assert told(read_season(session, 1)) == as_it_was, state
+    with database.transaction() as session:
+        count(session, job.id, {"places": {"1": 1, "2": 2}})
+        session.flush()
+        assert told(read_season(session, 1)) == [(0, 25, 1, 1), (1, 18, 1, 0)], "racer 0 is the first seed"
 
 
 def test_of_equals_who_has_won_more_leads_and_then_who_came_first(session: Session) -> None:

@@ -24,7 +24,7 @@ from racecraft.serve.problems import Conflict, NotFound
 from racecraft.serve.races.races import hold, state_of
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Duel, Finalist, Job, Race
-from racecraft.serve.submissions.finalists import board_of, duels_of, finalists_of
+from racecraft.serve.submissions.finalists import board_of, duels_of, finalists_of, places_of
 from racecraft.serve.submissions.infos import seconds_of
 from racecraft.serve.submissions.league import League
 from racecraft.serve.submissions.stages import final_of, is_decided, require_decided
@@ -69,6 +69,7 @@ class Finals:
             ranked = [row for row in board_of(session, before, user_id=None, top=terms.best).rows if row.place]
             if len(ranked) < 2:
                 raise Conflict(f"Fewer than two have a place in {before.title!r}.", hint="Hold another race.")
+            race.last_places = places_of(session, race)
             for table in (Duel, Finalist):
                 session.execute(sa.delete(table).where(table.race_id == race_id))
             rows = enumerate(ranked[: terms.best], start=1)

@@ -84,6 +84,7 @@ def count(session: Session, job_id: str, result: dict[str, Any]) -> None:
     race = session.scalars(sa.select(Race).where(Race.final_job_id == job_id)).one()
     for seed, place in result["places"].items():
         session.get_one(Finalist, (race.id, int(seed))).place = place
+    race.last_places = None
     race.closes = race.closes or now()
 
 

@@ -313,6 +313,8 @@ class Race(Table):
     """How many of the first of that race may enter this one."""
     final_job_id: Mapped[str | None] = mapped_column(ForeignKey("jobs.id"))
     """What drives the duels of a final, once its organiser has begun it."""
+    last_places: Mapped[dict[str, int] | None] = mapped_column(JSON)
+    """Of a final that is driven once more, what a season counts until there are new ones; by submission."""
     opens: Mapped[datetime] = mapped_column(default=now)
     closes: Mapped[datetime | None]
     over: Mapped[datetime | None]

@@ -25,6 +25,30 @@ def duels_of(session: Session, race_id: int) -> Sequence[Duel]:
     return session.scalars(sa.select(Duel).where(Duel.race_id == race_id).order_by(Duel.number)).all()
 
 
+def places_of(session: Session, race: Race) -> dict[str, int] | None:
+    """Places in a final by submission; while it is driven once more, or where that failed, those of before."""
+    query = sa.select(Finalist.submission_id, Finalist.place).where(Finalist.race_id == race.id)
+    return {str(submission): place for submission, place in session.execute(query) if place} or race.last_places
+
+
+def last_board_of(session: Session, race: Race, *, top: int) -> Board:
+    """The board of any race for who looks at none of its rows, of a final as it was driven last.
+
+    Args:
+        session: To read in.
+        race: Whose.
+        top: Rows from the top.
+    """
+    places = None if final_of(race) is None else places_of(session, race)
+    if not places:
+        return board_of(session, race, user_id=None, top=top)
+    query = sa.select(Submission, User.name).join(User, User.id == Submission.user_id)
+    found = session.execute(query.where(Submission.id.in_(map(int, places)))).all()
+    entered = sorted(((places[str(one.id)], one, name) for one, name in found), key=lambda of: (of[0], of[1].id))
+    rows = [_row(one, name, place, number) for number, (place, one, name) in enumerate(entered, start=1)]
+    return Board(rows=rows[:top], entrants=len(rows), ranked=len(rows), first_ms=None, behind=0)
+
+
 def board_of(session: Session, race: Race, *, user_id: int | None, top: int) -> Board:
     """The board of any race; that of a final has places instead of scores, and before it has them seeds.
 
@@ -38,18 +62,7 @@ def board_of(session: Session, race: Race, *, user_id: int | None, top: int) -> 
         return read_board(session, race.id, user_id=user_id, top=top)
     found = sorted(finalists_of(session, race.id), key=lambda one: (one.Finalist.place or 0, one.Finalist.seed))
     rows = [
-        Row(
-            submission=submission.id,
-            user=submission.user_id,
-            name=name,
-            model=submission.model,
-            place=finalist.place,
-            row=number,
-            score_ms=None,
-            best_lap_ms=None,
-            resets=0,
-            completion=0.0,
-        )
+        _row(submission, name, finalist.place, number)
         for number, (finalist, submission, name) in enumerate(found, start=1)
     ]
     mine = next((row for row in rows if row.user == user_id), None)
@@ -59,6 +72,22 @@ def board_of(session: Session, race: Race, *, user_id: int | None, top: int) -> 
         ranked=sum(row.place is not None for row in rows),
         first_ms=None,
         behind=sum((row.place or row.row) > (mine.place or mine.row) for row in rows) if mine is not None else 0,
+    )
+
+
+def _row(submission: Submission, name: str, place: int | None, number: int) -> Row:
+    """Of somebody in a final: a place, and no score of their own."""
+    return Row(
+        submission=submission.id,
+        user=submission.user_id,
+        name=name,
+        model=submission.model,
+        place=place,
+        row=number,
+        score_ms=None,
+        best_lap_ms=None,
+        resets=0,
+        completion=0.0,
     )
 
 

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session, aliased
 
 from racecraft.serve.races.races import state_of
 from racecraft.serve.store.tables import Race, User
-from racecraft.serve.submissions.finalists import board_of
+from racecraft.serve.submissions.finalists import last_board_of
 
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """By place, as Formula 1 gives them since 2010."""
@@ -75,7 +75,7 @@ def read_season(session: Session, group_id: int, *, public: bool = False) -> lis
     over = [(race, leads) for race, leads in session.execute(held.order_by(Race.id)) if state_of(race) == "closed"]
     found: dict[int, SeasonStanding] = {}
     for race, gives_none in over[-PUBLIC_RACES:] if public else over:
-        board = board_of(session, race, user_id=None, top=DEEPEST)
+        board = last_board_of(session, race, top=DEEPEST)
         for row in board.rows:
             if row.place is None:
                 continue
