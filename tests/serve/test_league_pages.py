@@ -207,6 +207,29 @@ def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Les
     assert "+25" in row.inner_text()
 
 
+def test_a_wall_says_what_film_is_gone_and_a_final_goes_on_without_it(lesson: Lesson, race: int) -> None:
+    teacher, state = lesson.visits["teacher"], lesson.league.console.runs / ".racecraft"
+    (final,) = [one["id"] for one in ok(lesson.league.owner.get("/api/league/races")) if one["form"] == "bracket"]
+    replays = [*state.glob("submissions/*/entry.replay"), *state.glob("finals/*/0/heat-0.replay")]
+    assert len(replays) == 3
+    for replay in replays:
+        replay.rename(replay.with_suffix(".away"))
+    try:
+        wall = teacher.open(f"/league/{race}/screen")
+        wall.get_by_role("alert").get_by_text("has no replay.").wait_for()
+        assert wall.get_by_text("Loading…").count() == 0
+        wall = teacher.open(f"/league/{final}/screen")
+        wall.get_by_role("alert").get_by_text("There is no heat 0 of a duel 0 in this race.").wait_for()
+        wall.get_by_role("button", name="Heat 2", pressed=True).wait_for()  # by itself
+        wall.get_by_label("Live").wait_for()
+    finally:
+        for replay in replays:
+            replay.with_suffix(".away").rename(replay)
+    gone = [one for one in teacher.complaints if "404" in one]
+    assert len(gone) == 2
+    teacher.complaints = [one for one in teacher.complaints if one not in gone]
+
+
 def test_a_spectator_without_account_sees_how_the_pace_went_in_the_public_races(lesson: Lesson, race: int) -> None:
     group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
     terms = {"title": "Monday cup", "track": "oval", "laps": 1}
