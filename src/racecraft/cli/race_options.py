@@ -20,13 +20,15 @@ Rivals = Annotated[
     typer.Option("--opponents", help="Of head-to-head: self, bots or a run folder; several runs by repeating it."),
 ]
 Cars = Annotated[
-    int,
+    int | None,
     typer.Option("--cars", help="To a head-to-head race, the learner's included; 2 by default.", show_default=False),
 ]
 NumObjects = Annotated[
-    int, typer.Option("--objects", help="Obstacles of object avoidance; 6 by default.", show_default=False)
+    int | None, typer.Option("--objects", help="Obstacles of object avoidance; 6 by default.", show_default=False)
 ]
-NumBots = Annotated[int, typer.Option("--bots", help="Bot cars of head-to-bot; 3 by default.", show_default=False)]
+NumBots = Annotated[
+    int | None, typer.Option("--bots", help="Bot cars of head-to-bot; 3 by default.", show_default=False)
+]
 BotSpeed = Annotated[
     float | None, typer.Option("--bot-speed", help="m/s of the bot cars; 0.2 by default.", show_default=False)
 ]
@@ -75,11 +77,12 @@ def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race")
 
     name = kind_of(race) or "time-trial"
     check_race(name, RACE_TYPES, hint="racecraft race RUN OTHER --type head-to-model has models race each other.")
-    placement, positions, count = options["placement"], options["positions"], options["objects"] or options["bots"]
+    placement, positions = options["placement"], options["positions"]
+    count = options["bots"] if options["objects"] is None else options["objects"]
     for name_given, is_given, needed in (
-        ("--objects", options["objects"] != 0, "object-avoidance"),
+        ("--objects", options["objects"] is not None, "object-avoidance"),
         ("--parked-cars", options["parked_cars"], "object-avoidance"),
-        ("--bots", options["bots"] != 0, "head-to-bot"),
+        ("--bots", options["bots"] is not None, "head-to-bot"),
         ("--bot-speed", options["bot_speed"] is not None, "head-to-bot"),
         ("--lane-changes", options["lane_changes"], "head-to-bot"),
     ):
@@ -96,7 +99,7 @@ def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race")
         except ValueError as error:
             raise ConfigError(f"--positions is {positions!r}; {error}.") from error
         settings["count"] = len(settings["positions"])
-    if count:
+    if count is not None:
         settings["count"] = count
     if options["bot_speed"] is not None:
         settings["speed"] = options["bot_speed"]
@@ -107,7 +110,7 @@ def objects_of(race: str, options: Mapping[str, Any], *, option: str = "--race")
     return objects_for_race(name, settings=settings)
 
 
-def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str, Opponents | None]:
+def opponents_of(race: str, *, opponents: list[str], cars: int | None = None) -> tuple[str, Opponents | None]:
     """The race as far as its objects go, and the other cars of a head-to-head race.
 
     Raises:
@@ -117,16 +120,16 @@ def opponents_of(race: str, *, opponents: list[str], cars: int = 0) -> tuple[str
 
     name = kind_of(race)
     check_race(name, (*RACE_TYPES, "head-to-head"), hint="Train for it with --race head-to-head.")
-    for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars != 0)):
+    for option, is_given in (("--opponents", bool(opponents)), ("--cars", cars is not None)):
         if is_given and name != "head-to-head":
             raise ConfigError(f"{option} goes with --race head-to-head; the race is {name}.")
     if name != "head-to-head":
         return race, None
     if opponents == ["bots"]:
-        if cars:
+        if cars is not None:
             raise ConfigError("--cars counts the cars that policies drive; bots are counted by --bots.")
         return "head-to-bot", None
     from racecraft.training.opponents import Opponents
 
-    given: dict[str, Any] = {"cars": cars} if cars else {}
+    given: dict[str, Any] = {} if cars is None else {"cars": cars}
     return "time-trial", Opponents(drivers=tuple(opponents) or ("self",), **given)

@@ -46,8 +46,8 @@ def race(
     collision_penalty: race_options.CollisionPenalty = None,
     max_resets: Annotated[int | None, typer.Option("--max-resets", help="Resets to a race.")] = None,
     direction: Annotated[str, typer.Option("--direction", help="forward or reverse.")] = "",
-    objects: race_options.NumObjects = 0,
-    bots: race_options.NumBots = 0,
+    objects: race_options.NumObjects = None,
+    bots: race_options.NumBots = None,
     bot_speed: race_options.BotSpeed = None,
     lane_changes: race_options.LaneChanges = False,
     parked_cars: race_options.ParkedCars = False,
@@ -126,8 +126,8 @@ def ladder(
     laps: Annotated[int, typer.Option("--laps", "-l", help="To a race.")] = 1,
     rules: Rules = "drfc",
     time_limit: Annotated[float, typer.Option("--time-limit", help="Seconds on the clock; 0 for none.")] = 180.0,
-    objects: race_options.NumObjects = 0,
-    bots: race_options.NumBots = 0,
+    objects: race_options.NumObjects = None,
+    bots: race_options.NumBots = None,
     bot_speed: race_options.BotSpeed = None,
     lane_changes: race_options.LaneChanges = False,
     parked_cars: race_options.ParkedCars = False,
@@ -273,5 +273,6 @@ def _objects(kind: str, options: Mapping[str, Any], *, is_ladder: bool = False) 
         what="Race type of a ladder" if is_ladder else "Race type",
     )
     if name in TOGETHER:
-        name = "object-avoidance" if options["objects"] else "head-to-bot" if options["bots"] else "time-trial"
+        asked = {"object-avoidance": options["objects"], "head-to-bot": options["bots"]}
+        name = next((race for race, count in asked.items() if count is not None), "time-trial")
     return race_options.objects_of(name, options, option="--type")

@@ -90,9 +90,9 @@ def train(
     ] = "none",
     race: race_options.TrainRace = "time-trial",
     opponents: race_options.Rivals = [],  # noqa: B006 (Typer copies it)
-    cars: race_options.Cars = 0,
-    objects: race_options.NumObjects = 0,
-    bots: race_options.NumBots = 0,
+    cars: race_options.Cars = None,
+    objects: race_options.NumObjects = None,
+    bots: race_options.NumBots = None,
     bot_speed: race_options.BotSpeed = None,
     lane_changes: race_options.LaneChanges = False,
     parked_cars: race_options.ParkedCars = False,
