@@ -88,7 +88,11 @@ def test_a_race_of_a_secret_is_announced_held_and_checked(racecraft: Run, traine
     again = racecraft("race", str(trained), *short, "--json").document
     assert racecraft("verify", str(replay), "--race", str(again["folder"]), "--json").status == 1
     assert racecraft("verify", str(again["folder"]), "--race", commitment).status == 1
-    assert racecraft("verify", str(replay), "--race", "nonsense").err.startswith("ConfigError")
+    nonsense = racecraft("verify", str(replay), "--race", commitment[1:])
+    assert nonsense.err.startswith("ConfigError: There is no race")
+    assert "64 signs of 0 to 9 and a to f" in nonsense.err
+    filmed = racecraft("film", str(replay), "-o", str(tmp_path / "our films" / "ü.mp4"))
+    assert (filmed.status, (tmp_path / "our films" / "ü.mp4").is_file()) == (0, True)
 
     both = racecraft("race", str(trained), *short, "--secret", "--seed", "4")
     assert both.status == 2
@@ -105,3 +109,10 @@ def test_a_race_of_a_secret_is_announced_held_and_checked(racecraft: Run, traine
     old = racecraft("verify", str(folder))
     assert old.status == 0
     assert "Driven under the old rules" in old.out
+
+
+@pytest.mark.parametrize("option", ["--race", "--commitment"])
+def test_an_empty_name_of_a_race_is_not_passed_over(racecraft: Run, option: str) -> None:
+    outcome = racecraft("verify", "race.replay", option, "")
+    assert outcome.status == 2
+    assert f"{option} is empty" in outcome.err

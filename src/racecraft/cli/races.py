@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeVar
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import Json, TrackOption, app, is_given, print_json, text
+from racecraft.cli.app import Json, TrackOption, app, is_given, make_folder_of, print_json, text
 
 if TYPE_CHECKING:
     from racecraft.race.announcement import Announcement
@@ -178,9 +178,11 @@ def film(
 
     The latter takes fifteen seconds: laps from its first to its best.
     """
+    if replay.is_dir() and (car or ghost):
+        context.fail("--car and --ghost are for a replay file; a run's folder is filmed as it learned.")
+    if output is not None and output.suffix.lower() == ".mp4":  # any other is refused before it is written
+        make_folder_of(output)
     if replay.is_dir():
-        if car or ghost:
-            context.fail("--car and --ghost are for a replay file; a run's folder is filmed as it learned.")
         from racecraft.judging.evolution import film_evolution
 
         path = film_evolution(replay, output)
@@ -218,6 +220,9 @@ def verify(
     from racecraft.cli import verify_text
     from racecraft.judging.board_verification import is_address, published_at, verify_board
 
+    for option, value in (("race", race), ("commitment", commitment)):
+        if is_given(context, option) and not value.strip():  # an empty variable of a shell's: nothing would be compared
+            context.fail(f"--{option} is empty; it says which race the replay must be of.")
     if replay is None:
         if not is_address(race):
             context.fail("Give a replay, or the address of a league's race with --race.")

@@ -7,11 +7,13 @@ race.json ─▶ announcement: commitment == SHA-256(secret + document), seed ==
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft.checks import shown
 from racecraft.contest.classification import classify
 from racecraft.contest.contest import result_rows
 from racecraft.contest.terms import TOGETHER
@@ -107,6 +109,9 @@ def published(race: str) -> Announcement | str:
     """
     if len(race) == 64 and all(digit in "0123456789abcdef" for digit in race) and not Path(race).exists():
         return race
+    if not os.path.exists(race):
+        hint = "Give a race.json, the folder of one, or a commitment: 64 signs of 0 to 9 and a to f."
+        raise ConfigError(f"There is no race {shown(race)}.", hint=hint)
     path = _results_of(Path(race))
     return _announcement(_read(path), path)
 
