@@ -100,6 +100,9 @@ def test_open_says_what_is_missing_and_guesses(tmp_path):
     with pytest.raises(RunError, match=r"run.json is missing") as error:
         RunFolder.open(tmp_path / "empty")
     assert error.value.hint == ""
+    with pytest.raises(RunError, match=r"holds no run") as error:
+        RunFolder.open(tmp_path)
+    assert error.value.hint == f"It is a folder of runs: name one of them, such as {tmp_path}/b."
     with pytest.raises(RunError, match="There is no run") as error:
         RunFolder.open(tmp_path / ("x" * 5000))  # which a file system does not even look up
     assert len(str(error.value)) < 600

@@ -140,8 +140,10 @@ class RunFolder:
             meant = path.name.partition("@")[0]  # a whole run is asked for where somebody names a checkpoint
             raise RunError(f"There is no run {shown(str(path))}.", hint=did_you_mean(meant, siblings))
         if not (path / "run.json").is_file():
-            is_model = any((path / name).is_file() for name in _OF_AWS)
-            raise RunError(f"{path} holds no run: run.json is missing.", hint=hint if is_model else "")
+            if not any((path / name).is_file() for name in _OF_AWS):
+                inside = list_runs(path)
+                hint = f"It is a folder of runs: name one of them, such as {typed(inside[0].path)}." if inside else ""
+            raise RunError(f"{path} holds no run: run.json is missing.", hint=hint)
         return cls(path)
 
     @property
