@@ -30,4 +30,5 @@ def test_a_folder_in_the_way_is_told_by_its_own_name(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="directory") as told:
         write_file(tmp_path / "a", b"new")
     assert (told.value.filename, told.value.filename2) == (str(tmp_path / "a"), None)
+    assert str(told.value).endswith(f": {str(tmp_path / 'a')!r}")  # without "-> None" behind it
     assert [path.name for path in tmp_path.iterdir()] == ["a"]

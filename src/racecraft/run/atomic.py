@@ -43,7 +43,8 @@ def write_file(path: Path, data: bytes | Iterable[bytes | memoryview], *, durabl
         with suppress(OSError):
             temporary.unlink()
         if isinstance(error, OSError):  # of a full disk the system does not say where it was
-            error.filename, error.filename2 = str(path), None
+            error.filename = str(path)
+            del error.filename2  # where a rename failed; None would be told as a name
         raise
     if durable:
         sync_folder(path.parent)
