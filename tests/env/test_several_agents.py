@@ -151,6 +151,8 @@ def test_mistakes_of_a_caller_are_said():
     with pytest.raises(ResetNeeded):
         env.step({"car_0": 0, "car_1": 0})
     env.reset(seed=2)
+    with pytest.raises(ConfigError, match="actions is 5; use a dict of agents and their actions"):
+        env.step(5)
     with pytest.raises(ConfigError, match="actions lack car_1"):
         env.step({"car_0": 0})
     with pytest.raises(ConfigError, match="seed"):

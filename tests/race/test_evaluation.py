@@ -340,6 +340,8 @@ def test_bad_commands_and_settings():
         drive(lambda state: np.zeros(3))
     with pytest.raises(NonFiniteAction):
         drive(Constant(np.nan, 1.0))
+    with pytest.raises(ConfigError, match="policy is 5; allowed is a driver, called with what its sensors read"):
+        evaluate(5, OVAL)
     with pytest.raises(ConfigError, match="sees"):
         evaluate(Constant(0.0, 1.0), OVAL, sees="pictures")
     for num_trials in (0, 1001, 2.0, True):

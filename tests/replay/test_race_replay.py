@@ -88,6 +88,16 @@ def test_what_is_no_replay_and_no_path_is_not_written(clean: Path, tmp_path: Pat
     with pytest.raises(ConfigError, match=r"^path is 5; use a file's path\.$"):
         write_replay(read_replay(clean), 5)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
+    with pytest.raises(ConfigError, match="evaluation is 5; use what"):
+        Replay.of(5)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match="max_numbers is 'a'; allowed is a whole number"):
+        read_replay(clean, max_numbers="a")  # type: ignore[arg-type]
+    evaluation = read_replay(clean).evaluation
+    with pytest.raises(ConfigError, match="title is 5; use a text"):
+        Replay.of(evaluation, title=5)  # type: ignore[arg-type]
+    for names in (("one",), ("one", 2), "ab"):
+        with pytest.raises(ConfigError, match=r"names is .*; allowed is a text for each of 2 trials\."):
+            Replay.of(evaluation, names=names)  # type: ignore[arg-type]
 
 
 def test_what_was_read_cannot_be_changed_by_mistake_and_is_told_as_genuine(clean: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Unpack
 
@@ -9,7 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_whole
+from racecraft.checks import check_type, check_whole
 from racecraft.env.info import single_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
@@ -131,6 +132,7 @@ class RacecraftParallelEnv(ParallelEnv[str, Observation, Any]):  # type: ignore[
         """
         if not self.agents:
             raise ResetNeeded("step() was called while no race is under way; call reset() first.")
+        check_type("actions", actions, Mapping, "use a dict of agents and their actions")
         missing = [agent for agent in self.agents if agent not in actions]
         if missing:
             raise ConfigError(f"actions lack {', '.join(missing)}; every agent in `agents` needs one.")

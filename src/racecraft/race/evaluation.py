@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
-from racecraft.checks import check_choice, check_whole
+from racecraft.checks import check_choice, check_whole, require
 from racecraft.errors import ConfigError, ShapeError
 from racecraft.race.conditions import Conditions
 from racecraft.race.default_reward import centerline_rewards
@@ -100,10 +100,11 @@ def evaluate(
         num_threads: Of the simulation; 0 takes one per core.
 
     Raises:
-        ConfigError: A setting is outside its range.
+        ConfigError: A setting is outside its range, or the policy cannot be called.
         ShapeError: The policy's commands do not have the shape (N, 2).
         NonFiniteAction: A command is NaN or infinite.
     """
+    require("policy", policy, callable(policy), "a driver, called with what its sensors read")
     sensors, sees = _sensors_of(policy, sensors), sight_of(policy, sees)
     conditions = Conditions(
         track=track,

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_type
+from racecraft.checks import check_type, check_whole, require
 from racecraft.errors import ConfigError, RacecraftError, ReplayError, printable
 from racecraft.json_file import read_bytes
 from racecraft.race.announcement import Announcement
@@ -70,12 +70,22 @@ class Replay:
 
     @classmethod
     def of(cls, evaluation: Evaluation, *, title: str = "", names: tuple[str, ...] = ()) -> Replay:
-        """The replay of an evaluation; its trials are named after their numbers unless names are given."""
+        """The replay of an evaluation; its trials are named after their numbers unless names are given.
+
+        Raises:
+            ConfigError: It is no evaluation, the title is no text, or the names are not one text for each trial.
+        """
+        check_type("evaluation", evaluation, Evaluation, "use what racecraft.race.evaluate gives")
+        check_type("title", title, str, "use a text")
         trials = evaluation.trials
+        are_texts = isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)
+        require(
+            "names", names, are_texts and len(names) in (0, len(trials)), f"a text for each of {len(trials)} trials"
+        )
         return cls(
             title=title,
             conditions=evaluation.conditions,
-            names=names or tuple(f"trial {trial.index + 1}" for trial in trials),
+            names=tuple(names) or tuple(f"trial {trial.index + 1}" for trial in trials),
             cars=trials,
             rewards=tuple(trial.recording.rewards for trial in trials),
         )
@@ -167,8 +177,10 @@ def read_replay(path: str | Path, *, max_numbers: int = MAX_CELLS) -> Replay:
         max_numbers: That all its rows may have, for who has less memory to spare; so much less the file may hold, too.
 
     Raises:
+        ConfigError: `max_numbers` is none.
         ReplayError: It is damaged, hostile, too long, or of another version.
     """
+    check_whole("max_numbers", max_numbers, 1)
     share = max_numbers / MAX_CELLS
     try:
         data = read_bytes(path, max_bytes=int(share * MAX_FILE_BYTES))
