@@ -90,6 +90,16 @@ def test_wrong_usage_is_status_2(racecraft: Run, arguments: list[str], says: str
         (["tracks", "sheet", "oval", "ovla"], "TrackNotFound", "Did you mean 'oval'?"),
         (["tracks", "sheet", "oval", "--columns", "0"], "TrackError", "0"),
         (["tracks", "sheet", "oval", "-o", "oval.txt"], "TrackError", "txt"),
+        (
+            ["league", "token", " "],
+            "ConfigError",
+            "The token's name is ' '; allowed is what the list of tokens is to show.",
+        ),
+        (
+            ["worker", "--server", "http://127.0.0.1:1", "--token-file", "t", "--trainings", "-1"],
+            "ConfigError",
+            "trainings is -1; allowed is a whole number from 0 to 64.",
+        ),
         (["reward", "check", "racign"], "RewardError", "Did you mean 'racing'?"),
         (["reward", "show", "racign"], "RewardError", "Did you mean 'racing'?"),
         (["bench", "--only", "simulatr"], "ConfigError", "Did you mean 'simulator'?"),

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from racecraft.checks import require
 from racecraft.cli.app import Json, app, print_json
 from racecraft.cli.serve import Database
 from racecraft.extras import needed_for
@@ -101,6 +102,7 @@ def token(
         from racecraft.serve.settings import OWNER, ServeSettings
         from racecraft.serve.store.database import Database as Tables
 
+    require("The token's name", title, bool(title.strip()), "what the list of tokens is to show")
     tables = Tables(ServeSettings(runs=runs, database=database).database_url)
     tables.require_current()
     number, secret = Keys(tables).make_token(OWNER, title=title[:64], scopes=[WORKER], days=days)

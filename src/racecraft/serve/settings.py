@@ -86,8 +86,8 @@ class ServeSettings:
         is_text = not any("\ud800" <= mark <= "\udfff" for mark in str(self.runs))  # for bytes that are none
         require("runs", str(self.runs), is_text, "a path in UTF-8")
         require("port", self.port, 0 <= self.port <= 65535, "0 to 65535, where 0 takes a free one")
-        for name in ("training_slots", "other_slots"):
-            check_whole(name, getattr(self, name), 0, 64)
+        for name, places in (("trainings", self.training_slots), ("others", self.other_slots)):  # as the options are
+            check_whole(name, places, 0, 64)
         if not self.machine:
             mark = sha256(str(self.runs).encode()).hexdigest()[:6]
             object.__setattr__(self, "machine", f"{socket.gethostname()[: MAX_MACHINE - 7]}-{mark}")
