@@ -47,7 +47,9 @@ def test_no_number_of_the_table_is_folded(tmp_path: Path, capsys: pytest.Capture
     names = ("OFF_TRACK_PENALTY", "BORDER_LOSS", "learning_rate", "gamma", "ent_coef")
     params = dict(zip(names, (-0.00057961, 0.1714, 0.00020281, 0.99969, 123456.0), strict=True))
     say_one_trial(params, 1.0, tmp_path)
-    row = next(line for line in capsys.readouterr().out.splitlines() if "(now)" in line)
+    told = capsys.readouterr().out
+    assert "\n1 trial: 1 complete.\n" in told
+    row = next(line for line in told.splitlines() if "(now)" in line)
     assert row.split()[-5:] == ["-0.00058", "0.1714", "0.000203", "0.9997", "1.23e+05"]
 
 

@@ -39,7 +39,8 @@ def say_tuned(outcome: Outcome) -> None:
         for state in ("complete", "pruned", "out of time", "fail")
         if any(trial.state == state for trial in outcome.trials)
     )
-    console.print(Text(f"{len(outcome.trials)} trials: {counts}.", style="dim"), soft_wrap=True)
+    number = len(outcome.trials)
+    console.print(Text(f"{number} trial{'' if number == 1 else 's'}: {counts}.", style="dim"), soft_wrap=True)
     if outcome.importances:
         show_table(console, _importances(outcome))
     else:
