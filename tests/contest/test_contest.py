@@ -61,6 +61,19 @@ def test_a_seed_or_a_number_of_trials_that_is_none_is_told(settings: dict[str, A
             rate_models(["a", "b"], tracks="oval", **settings)
 
 
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"root": 5}, "root is 5; use a folder's path"),
+        ({"minimum_laps": "a"}, "minimum_laps is 'a'; allowed is 1 to 3, the laps of the race"),
+        ({"minimum_laps": 1.5}, "minimum_laps is 1.5; allowed is 1 to 3, the laps of the race"),
+    ],
+)
+def test_a_place_and_laps_that_are_none_are_told(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        race_models(["a", "b"], track="oval", **settings)
+
+
 @pytest.mark.costly
 def test_a_race_writes_results_replays_and_sim_traces(models: list[Path], tmp_path: Path) -> None:
     found = race(models, tmp_path, kind="object-avoidance", objects=BOXES, seed=5)

@@ -118,6 +118,11 @@ def test_a_blind_policy_masters_nothing():
     assert found.mastered == ()
 
 
+def test_directions_that_are_none_are_told():
+    with pytest.raises(ConfigError, match="directions is 5; use a list of forward, reverse"):
+        generalize(LineFollower(), TRACKS[:1], directions=5)
+
+
 def test_what_is_named_twice_counts_once(table):
     twice = generalize(
         LineFollower(), [*TRACKS[:1], *TRACKS[:1]], camera=SMALL, directions=["reverse", "reverse"], num_threads=1

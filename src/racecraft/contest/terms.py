@@ -83,7 +83,8 @@ def race_terms(
     check_choice("ranking", ranking, RANKINGS)
     trials, laps = check_trials(kind, num_trials), conditions.rules.laps
     needed = laps_needed(ranking, laps) if minimum_laps is None else minimum_laps
-    require("minimum_laps", needed, 1 <= needed <= laps, f"1 to {laps}, the laps of the race")
+    is_within = type(needed) is int and 1 <= needed <= laps
+    require("minimum_laps", needed, is_within, f"1 to {laps}, the laps of the race")
     if ranking == "total" and needed < laps:
         raise ConfigError(
             f"A race ranked by the total time needs all {laps} laps, as fewer take less; minimum_laps is {needed}.",

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
+from racecraft.checks import check_type
 from racecraft.contest.contest import Contest, hold_race
 from racecraft.contest.terms import race_terms
 from racecraft.errors import RunError
@@ -107,6 +109,7 @@ def race_models(
         RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
     """
     check_models(models)
+    check_type("root", root, (str, PathLike), "use a folder's path")
     given = {"laps": laps, **(changes or {})}
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
-from racecraft.checks import check_choice, check_whole
+from racecraft.checks import check_choice, check_type, check_whole
 from racecraft.errors import ConfigError
 from racecraft.race.evaluation import MAX_STEPS, Driver, RememberingDriver, begin_anew, drive_lap, sight_of
 from racecraft.race.placement import start_pose
@@ -159,6 +159,7 @@ def generalize(
     check_whole("seed", seed, 0, 2**64 - 1)
     if isinstance(directions, str):
         directions = [directions]
+    check_type("directions", directions, Sequence, f"use a list of {', '.join(DIRECTIONS)}")
     for direction in directions:
         check_choice("direction", direction, DIRECTIONS)
     if not tracks or not directions:
