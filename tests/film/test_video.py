@@ -6,6 +6,7 @@ import pytest
 
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.overlay import HEIGHT, INSET, WIDTH, Overlay
+from racecraft.film.racing_line import draw_racing_line
 from racecraft.film.video import END_SECONDS, blink, film, follow, frames
 from racecraft.race import Autopilot, RaceRules, Recording, evaluate
 from racecraft.sim import CameraSpec
@@ -48,6 +49,15 @@ def test_bad_paths(tmp_path):
     with pytest.raises(RunError, match="cannot be written"):
         film(CLUMSY, tmp_path / "nowhere" / "race.mp4")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_recording_and_no_path_is_told():
+    with pytest.raises(ConfigError, match="recording is 5; use a trial's recording"):
+        film(5, "car.mp4")
+    with pytest.raises(ConfigError, match="path is 5; use a file's path"):
+        film(None, 5)
+    with pytest.raises(ConfigError, match="recording is 5; use a trial's recording"):
+        draw_racing_line(5, "line.png")
 
 
 def test_an_empty_recording():
