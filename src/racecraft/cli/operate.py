@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from racecraft.checks import require
 from racecraft.cli.app import Json, app, print_json
 from racecraft.cli.serve import Database
 from racecraft.extras import needed_for
@@ -96,6 +95,8 @@ def token(
     as_json: Json = False,
 ) -> None:
     """Make a token for machines that work for this league, and print it; the server may be running."""
+    from racecraft.checks import require
+
     with needed_for("A league"):
         from racecraft.serve.audit.audit import Audit
         from racecraft.serve.people.keys import WORKER, Keys
