@@ -199,10 +199,10 @@ def test_perception_remembers_a_lap_in_the_next_one(console: RunningConsole) -> 
     assert [lap.goes_on for lap in laps] == [False, True]
     said = perceive([evaluation], num_threads=1)[len(laps[0].time) :]
     path = f"/api/models/{folder.name}/evaluations/{evaluation.parent.name.removeprefix('evaluation-')}/belief"
-    for row in range(4):
-        told = console.client.get(path, params={"lap": 2, "row": row}).json()
-        for name, most in (("heading_rad", 0.002), ("offset_m", 0.002)):
-            assert told[name] == pytest.approx(said[row][name], abs=most), (name, row)
+    told = [console.client.get(path, params={"lap": 2, "row": row}).json() for row in range(4)]
+    ours, theirs = (np.array([[one["heading_rad"], one["offset_m"]] for one in them]) for them in (told, said[:4]))
+    away = np.abs(ours - theirs).mean(axis=0)  # rad and m; 0.0056 and 0.0058 without the lap before
+    assert (away < 0.002).all()
 
 
 def test_a_model_for_a_car_and_driven_as_one(raced: tuple[RunningConsole, str, str], tmp_path: Path) -> None:
