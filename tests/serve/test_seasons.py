@@ -79,29 +79,9 @@ def test_what_counts_is_what_is_over_under_a_secret_and_not_put_away(session: Se
     assert [(one.race, one.title, one.place) for one in only.results] == [(counted.id, "counts", 1)]
 
 
-def test_a_final_gives_the_points_of_its_qualifying(session: Session) -> None:
-    qualifying = race_of(session, {0: 9000, 1: 9900, 2: 10_000})
-    document = {"final": {"form": "bracket", "best": 2, "qualifying": "c"}}
-    final = race_of(session, {}, after_id=qualifying.id, document=document)
-    entered = {one.user_id - 10: one.id for one in session.query(Submission).filter_by(race_id=qualifying.id)}
-    for seed, (racer, place) in enumerate(((0, 2), (1, 1)), start=1):
-        session.add(Finalist(race_id=final.id, seed=seed, submission_id=entered[racer], place=place))
-    session.flush()
-    season = read_season(session, 1)
-    assert told(season) == [(1, 25, 1, 1), (0, 18, 1, 0), (2, 0, 0, 0)]
-    assert [(one.race, one.place, one.points) for one in season[0].results] == [
-        (qualifying.id, 2, 0),
-        (final.id, 1, 25),
-    ]
-    assert [one.gap for one in season[0].results] == [pytest.approx(0.1), None], "two who meet have no gap"
-    final.deleted = now()
-    session.flush()
-    assert told(read_season(session, 1)) == [(0, 25, 1, 1), (1, 18, 1, 0), (2, 15, 1, 0)], "it leads nowhere any more"
-
-
-def final_of_two(session: Session) -> Race:
-    """Racer 1 has won it and racer 0 lost; it follows a race that they were in."""
-    qualifying = race_of(session, {0: 9000, 1: 9900})
+def final_of_two(session: Session, qualified: dict[int, int]) -> Race:
+    """Racer 1 has won it and racer 0 lost; it follows a race that they were in, with such times in ms by racer."""
+    qualifying = race_of(session, qualified)
     document = {"final": {"form": "bracket", "best": 2, "qualifying": "c"}}
     final = race_of(session, {}, after_id=qualifying.id, document=document)
     entered = {one.user_id - 10: one.id for one in session.query(Submission).filter_by(race_id=qualifying.id)}
@@ -111,8 +91,22 @@ def final_of_two(session: Session) -> Race:
     return final
 
 
+def test_a_final_gives_the_points_of_its_qualifying(session: Session) -> None:
+    final = final_of_two(session, {0: 9000, 1: 9900, 2: 10_000})
+    season = read_season(session, 1)
+    assert told(season) == [(1, 25, 1, 1), (0, 18, 1, 0), (2, 0, 0, 0)]
+    assert [(one.race, one.place, one.points) for one in season[0].results] == [
+        (final.after_id, 2, 0),
+        (final.id, 1, 25),
+    ]
+    assert [one.gap for one in season[0].results] == [pytest.approx(0.1), None], "two who meet have no gap"
+    final.deleted = now()
+    session.flush()
+    assert told(read_season(session, 1)) == [(0, 25, 1, 1), (1, 18, 1, 0), (2, 15, 1, 0)], "it leads nowhere any more"
+
+
 def test_who_has_deleted_their_account_is_in_no_season_also_after_a_final(session: Session) -> None:
-    final = final_of_two(session)
+    final = final_of_two(session, {0: 9000, 1: 9900})
     winner = session.get_one(User, 11)
     winner.name, winner.handle, winner.deleted = "(gone 11)", None, now()
     session.flush()
@@ -128,7 +122,7 @@ def test_a_final_that_is_driven_once_more_says_that_its_board_is_not_the_last(da
             [Group(id=1, title="ours"), Job(id="j", kind="judge", run=""), Job(id="f", kind="final", run="")]
         )
         session.flush()
-        final = final_of_two(session)
+        final = final_of_two(session, {0: 9000, 1: 9900})
         final.document = {**final.document, "vehicle": vars(load_vehicle("v5"))}
         final.visibility, final.final_job_id, number = "public", "f", final.id
     league = League(database, lambda _: pytest.fail("nobody asks for a track"))
@@ -144,7 +138,7 @@ def test_until_a_final_has_been_driven_once_more_its_last_places_count(database:
         session.add_all([Group(id=1, title="ours"), Job(id="j", kind="judge", run="", state="done")])
         session.flush()
         session.add(Member(group_id=1, user_id=10, role="organiser"))
-        final = final_of_two(session)
+        final = final_of_two(session, {0: 9000, 1: 9900})
         final.document = {**final.document, "vehicle": vars(load_vehicle("v5"))}
         number = final.id
     league = League(database, lambda _: pytest.fail("nobody asks for a track"))
