@@ -8,10 +8,15 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from chromium import CHROMIUM
+from chromium import CHROMIUM, launched
+from few_frames import FEW_FRAMES
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "build" / "site"
@@ -42,3 +47,21 @@ def hosted(folder: Path = SITE.parent, files: type[Files] = Files) -> Iterator[s
     finally:
         host.shutdown()
         host.server_close()
+
+
+@contextmanager
+def opened_page(**context: Any) -> Iterator[Page]:
+    """The page in English, without motion and with few frames; what it complains of fails whoever opened it."""
+    from playwright.sync_api import sync_playwright
+
+    complaints: list[str] = []
+    with hosted() as address, sync_playwright() as playwright:
+        here = launched(playwright).new_context(base_url=address, locale="en-US", reduced_motion="reduce", **context)
+        here.set_default_timeout(PATIENCE)
+        here.add_init_script(FEW_FRAMES)
+        page = here.new_page()
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto("./")
+        yield page
+        here.close()
+    assert complaints == []

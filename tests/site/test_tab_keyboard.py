@@ -9,10 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
-from built_page import NEEDS_THE_PAGE, PATIENCE, hosted
-
-from chromium import launched
-from few_frames import FEW_FRAMES
+from built_page import NEEDS_THE_PAGE, opened_page
 
 if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
@@ -22,19 +19,8 @@ pytestmark = NEEDS_THE_PAGE
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
-    from playwright.sync_api import sync_playwright
-
-    complaints: list[str] = []
-    with hosted() as address, sync_playwright() as playwright:
-        context = launched(playwright).new_context(base_url=address, locale="en-US", reduced_motion="reduce")
-        context.set_default_timeout(PATIENCE)
-        context.add_init_script(FEW_FRAMES)
-        page = context.new_page()
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.goto("./")
+    with opened_page() as page:
         yield page
-        context.close()
-    assert complaints == []
 
 
 def button(page: Page, name: str) -> Locator:
