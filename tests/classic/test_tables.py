@@ -67,9 +67,8 @@ def test_q_learning_crosses_the_frozen_lake(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_beside_the_cliff_q_learning_walks_along_the_edge_and_sarsa_does_not(seed: int) -> None:
-    careful, bold = learn("CliffWalking-v1", "sarsa", seed=seed), learn("CliffWalking-v1", "q-table", seed=seed)
+def test_beside_the_cliff_q_learning_walks_along_the_edge_and_sarsa_does_not() -> None:
+    careful, bold = (learn("CliffWalking-v1", algorithm, seed=1) for algorithm in ("sarsa", "q-table"))
     assert np.mean(careful.returns[-1000:]) == pytest.approx(-17.0, abs=2.0)
     assert np.mean(bold.returns[-1000:]) == pytest.approx(-17.0, abs=2.0)
     assert bold.mean_return == -13.0
