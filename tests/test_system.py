@@ -120,6 +120,7 @@ print(*(resource.getrlimit(kind) for kind in (resource.RLIMIT_CPU, resource.RLIM
         assert done.stdout.split() == f"(60, 60) ({written}, {written}) (0, 0)".split()
 
 
+@pytest.mark.costly
 @pytest.mark.skipif(os.name != "posix", reason="groups of processes")
 def test_a_process_ends_with_all_that_it_started() -> None:
     program = "import subprocess, sys; print(subprocess.Popen(['sleep', '60']).pid, flush=True); input()"

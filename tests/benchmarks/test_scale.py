@@ -25,6 +25,7 @@ def scale() -> ModuleType:
     return module
 
 
+@pytest.mark.costly
 def test_entries_wait_for_a_free_core_and_no_longer(scale: ModuleType) -> None:
     assert scale.waits([0.0, 0.0, 0.5, 9.0], 1, 2.0).tolist() == [0.0, 2.0, 3.5, 0.0]
     assert scale.waits([0.0, 0.0, 0.5, 9.0], 2, 2.0).tolist() == [0.0, 0.0, 1.5, 0.0]

@@ -480,6 +480,7 @@ def test_damaged_files_are_refused(saved: Path, tmp_path: Path) -> None:
         resume(tmp_path / "nothing")
 
 
+@pytest.mark.costly
 def test_a_name_that_is_taken_or_not_allowed(saved: Path) -> None:
     for name in ("a", "../x"):
         with pytest.raises(RunError):

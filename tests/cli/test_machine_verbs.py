@@ -9,6 +9,7 @@ from racecraft.bench import suite
 from racecraft.errors import RacecraftError
 
 
+@pytest.mark.costly
 def test_the_doctor(racecraft: Run) -> None:
     outcome = racecraft("doctor")
     assert outcome.status == 0, outcome.out

@@ -122,6 +122,7 @@ def test_a_reward_that_fails_late_is_one_error(racecraft: Run, tmp_path: Path) -
     assert "Traceback" not in outcome.err
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_training_is_status_130_and_can_go_on(racecraft: Run, number: signal.Signals) -> None:
     ended = threading.Event()

@@ -167,6 +167,7 @@ def test_what_is_not_translated_says_why(body, reason):
         cuda_source(f"import math\ndef reward_function(params):\n    {body}\n")
 
 
+@pytest.mark.costly
 def test_translations_compile_for_gpus():
     pytest.importorskip("cuda.bindings.nvrtc", reason="cuda-bindings is not installed")
     code = compile_program(cuda_source(PYTHON), name="reward.cu", architecture="compute_80", include=SOURCES)

@@ -141,6 +141,7 @@ BASES = [
 ]
 
 
+@pytest.mark.costly
 @settings(deadline=None, max_examples=200)
 @given(data=st.data(), base=st.sampled_from(BASES))
 def test_damage_is_an_error_or_changes_nothing(
@@ -165,6 +166,7 @@ def test_damage_is_an_error_or_changes_nothing(
         assert len(content) <= 1 << 20
 
 
+@pytest.mark.costly
 @settings(deadline=None, max_examples=60)
 @given(files=st.dictionaries(st.from_regex(r"[a-z]{1,8}(/[a-z]{1,8}){0,3}", fullmatch=True), st.binary(max_size=3000)))
 def test_any_content_comes_back(files: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -70,6 +70,7 @@ def test_an_archive_of_racecrafts_own_is_foreign_too(tmp_path: Path) -> None:
     assert is_foreign(import_run(archive, root=tmp_path / "theirs", name="mine").run)
 
 
+@pytest.mark.costly
 def test_a_run_on_a_drawn_road_goes_on_where_that_road_comes_with_it(tmp_path: Path) -> None:
     oval = load_track("oval")
     road = tmp_path / "mine.npy"
@@ -118,6 +119,7 @@ def test_within_walls_it_trains_and_leaves_no_trace(tmp_path: Path, imported: Pa
     assert not (tmp_path / "marker").exists()
 
 
+@pytest.mark.costly
 @pytest.mark.usefixtures("_no_walls")
 def test_the_mark_goes_with_the_reward_and_not_with_the_weights(imported: Path, tmp_path: Path) -> None:
     folder = RunFolder.open(imported)

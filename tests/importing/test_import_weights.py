@@ -274,6 +274,7 @@ def test_a_trained_model_without_hyperparameters_goes_on_with_awss(tmp_path: Pat
     assert "There is no hyperparameters.json: it trains with Racecraft's own settings." in fresh.notes
 
 
+@pytest.mark.costly
 def test_the_weights_of_the_pretrained_model_until_there_are_own_ones(tmp_path: Path) -> None:
     env = "DR_WORLD_NAME=oval\nDR_LOCAL_S3_MODEL_PREFIX=my-model\nDR_LOCAL_S3_PRETRAINED=True\n"
     env += "DR_LOCAL_S3_PRETRAINED_PREFIX=older\n"

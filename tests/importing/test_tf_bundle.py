@@ -56,6 +56,7 @@ def test_whatever_bit_flips_it_is_a_sentence_or_nothing(tmp_path: Path) -> None:
     assert not any("\n" in message for message in messages)
 
 
+@pytest.mark.costly
 def test_wherever_it_is_cut_off_it_is_a_sentence(tmp_path: Path) -> None:
     index = write_checkpoint(tmp_path, "4_Step-9.ckpt", few_tensors(6))
     whole = index.read_bytes()
@@ -109,6 +110,7 @@ def test_a_block_that_is_listed_many_times_is_read_once(tmp_path: Path) -> None:
     is_refused(content, "do not lie one behind the other", tmp_path)
 
 
+@pytest.mark.costly
 def test_more_names_than_any_network_has_are_one_sentence(tmp_path: Path) -> None:
     names = ((b"%d" % i, entry()) for i in range(11_000))  # seconds to write, so not while tests are collected
     is_refused(table([HEADER, *names]), "more than 10,000 tensors", tmp_path)

@@ -58,6 +58,7 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps(document))
 
 
+@pytest.mark.costly
 def test_the_commitment_is_told_before_anybody_drives(models: list[Path], tmp_path: Path) -> None:
     told: list[Announcement] = []
 
@@ -76,6 +77,7 @@ def test_the_commitment_is_told_before_anybody_drives(models: list[Path], tmp_pa
     assert other.trials[0][0].recording.rows[0].tolist() != found.contest.trials[0][0].recording.rows[0].tolist()
 
 
+@pytest.mark.costly
 def test_a_race_is_genuine_from_its_files_alone(held: Path, models: list[Path], tmp_path: Path) -> None:
     found = verify_race(held, num_threads=1)
     assert (found.is_genuine, found.is_old, found.foul) == (True, False, "")
@@ -126,6 +128,7 @@ def easier(models: list[Path], held: Path, **conditions: Any) -> Any:
         ({"seed": 4}, "driven from the seed 4"),
     ],
 )
+@pytest.mark.costly
 def test_a_replay_made_under_easier_rules_is_not_the_races(
     models: list[Path], held: Path, folder: Path, change: dict[str, Any], words: str
 ) -> None:

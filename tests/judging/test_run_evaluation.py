@@ -130,6 +130,7 @@ def test_a_run_that_cannot_be_written_to_is_an_error_of_ours(tmp_path: Path) -> 
         run.chmod(0o700)
 
 
+@pytest.mark.costly
 def test_a_folder_with_a_file_in_the_way_is_an_error_of_ours(tmp_path: Path) -> None:
     run = trained(tmp_path)
     (run / "mp4").write_text("in the way")
@@ -178,6 +179,7 @@ def test_a_checkpoint_that_does_not_describe_its_network_is_refused(
         assert isinstance(caught.value, CheckpointError | ConfigError)
 
 
+@pytest.mark.costly
 def test_a_run_without_a_checkpoint_says_so(tmp_path: Path) -> None:
     run = trained(tmp_path)
     for path in (run / "checkpoints").iterdir():

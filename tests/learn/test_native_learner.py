@@ -114,6 +114,7 @@ def test_every_branch_agrees_with_numpy_and_torch(spec):
 
 
 @pytest.mark.parametrize("spec", BRANCHES, ids=name_of)
+@pytest.mark.costly
 def test_gradient_of_every_branch_is_exact(spec):
     assert_exact_gradient(spec, size=19, value_loss="mse")
 
@@ -199,6 +200,7 @@ def assert_exact_gradient(spec: NetworkSpec, *, size: int, value_loss: str) -> N
     # a camera critic starts with large errors, whose rounding Adam makes as large as any other gradient
     [(True, 21, 1e-4), (False, 21, 1e-4), (True, 0, 1e-3)],
 )
+@pytest.mark.costly
 def test_fifty_steps_stay_close_to_torch(is_discrete, state_size, limit):
     spec = NetworkSpec(num_actions=3, is_discrete=is_discrete, state_size=state_size)
     native, torch = NativeLearner(spec, num_threads=2), TorchLearner(spec, precision="float32", num_threads=2)

@@ -139,6 +139,7 @@ def test_each_car_can_have_its_own_globals(track, rows):
         assert worker(rows[:10]).tolist() == [2.0] * 5 + [3.0] * 5
 
 
+@pytest.mark.costly
 def test_random_numbers_repeat_with_the_seed(track, rows):
     top = "import random\nimport numpy as np\nshift = random.random()\n"
     source = function("return shift + random.random() + np.random.rand() + hash('a') % 7", top=top)
@@ -159,6 +160,7 @@ def test_dataclasses_enums_and_imports_inside_functions(track, rows):
         assert worker(rows[:3]).tolist() == [1.0, 2.0, 3.0]
 
 
+@pytest.mark.costly
 def test_scientific_packages_are_at_hand(track, rows):
     top = "import numpy, scipy.spatial, shapely\n"
     source = function("return shapely.LineString(params['waypoints']).length", top=top)

@@ -40,6 +40,7 @@ def test_a_missing_package_says_how_to_get_it(track, monkeypatch):
     assert caught.value.line == 2
 
 
+@pytest.mark.costly
 def test_a_source_that_hangs_while_it_loads(track):
     with pytest.raises(RewardError, match=r"within 0\.3 s") as caught:
         RewardWorker("x = 1\nwhile True: pass", track, start_timeout_s=0.3)

@@ -47,6 +47,7 @@ def drive(writer, counter, lengths, rng, steps=60, step=None):
     return ended
 
 
+@pytest.mark.costly
 @needs_logs
 def test_real_episodes_come_out_as_aws_wrote_them(tmp_path):
     real = (DRFC / "training-simtrace-20-iteration.csv").read_text().splitlines()

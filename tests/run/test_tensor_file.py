@@ -24,6 +24,7 @@ TYPES = ["?", "i1", "u1", "<i2", "<u2", "<f2", "<i4", "<u4", "<f4", "<i8", "<u8"
         max_size=5,
     )
 )
+@pytest.mark.costly
 def test_the_library_reads_back_what_was_written(saved):
     read = load(b"".join(tensor_file(saved, {"about": "näive"})))
     assert set(read) == set(saved)

@@ -80,6 +80,7 @@ def test_as_many_tokens_groups_members_and_comments_as_there_may_be(
     assert count(database, Comment.id) == MOST
 
 
+@pytest.mark.costly
 def test_of_cards_links_and_codes_that_are_made_together_one_is_good(database: Database) -> None:
     keys, groups = Keys(database), Groups(database)
     number = groups.create("club", by=People(database).get(ADA))

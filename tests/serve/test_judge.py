@@ -216,6 +216,7 @@ def test_a_heat_s_two_drive_from_their_own_files_under_their_own_names(told: Tol
     assert read_replay(results / JUDGED).names == ("second", "first")
 
 
+@pytest.mark.costly
 def test_what_sees_by_perception_is_judged_by_a_judge_that_never_saw_any(told: Told, tmp_path: Path) -> None:
     """Its weights are read within the walls: in a process of its own, where nothing else had loaded them."""
     run = untrained_run(tmp_path, "seer", network=PERCEPTION)

@@ -67,6 +67,7 @@ def database(tmp_path: Path) -> Iterator[Database]:
     database.close()
 
 
+@pytest.mark.costly
 def test_whose_reward_a_kept_trial_has_follows_from_whose_search_it_was(database: Database, tmp_path: Path) -> None:
     with database.transaction() as session:
         guest = add_person(session, "Ada")
@@ -85,6 +86,7 @@ def test_whose_reward_a_kept_trial_has_follows_from_whose_search_it_was(database
         assert kept.read_aws_hyperparameters()["lr"] == 0.001
 
 
+@pytest.mark.costly
 def test_a_trial_that_the_search_did_not_ask_for_is_not_kept(database: Database, tmp_path: Path) -> None:
     bench = Bench(database, tmp_path, OWNER)
     settings = json.loads((bench.trial.path / "run.json").read_text())["settings"]

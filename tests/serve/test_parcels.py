@@ -176,6 +176,7 @@ def test_ghosts_of_a_heat_are_those_that_were_asked_for(desk: Desk) -> None:
     desk.send(job, "contests", heat, {"race.replay": b"what was driven"})
 
 
+@pytest.mark.costly
 def test_a_guests_search_is_made_as_a_guests_whatever_its_folder_says(
     desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -251,6 +251,7 @@ def test_models_are_entered_all_or_none(stewards: Stewards) -> None:
     assert len(stewards.queue.list(kind="race")) == 2
 
 
+@pytest.mark.costly
 def test_of_two_who_race_for_the_last_place_one_gets_it(
     either_stewards: Stewards, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -67,6 +67,7 @@ OUT: dict[str, Shut] = {
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("out", OUT)
 @pytest.mark.parametrize("way", [by_card, by_password, by_provider])
 def test_who_is_shut_out_on_the_way_in_has_no_session(
@@ -75,6 +76,7 @@ def test_who_is_shut_out_on_the_way_in_has_no_session(
     meet(app, ada, monkeypatch, OUT[out], *way(app, ada, monkeypatch))
 
 
+@pytest.mark.costly
 def test_nor_who_comes_by_a_card_or_a_password_that_is_another_by_then(
     app: FastAPI, ada: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -77,6 +77,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     [[b""], [b"{"] + [b" "] * 600, [SIGN_IN[:20] + b" " * 20_000] + [b" "] * 600],
     ids=["nothing", "byte by byte", "much and then little"],
 )
+@pytest.mark.costly
 def test_a_body_that_does_not_end_is_not_waited_for(tmp_path: Path, length: int | None, parts: list[bytes]) -> None:
     async def ask() -> str:
         async with a_league(tmp_path) as at:

@@ -33,6 +33,7 @@ def a_second_is_refused(url: str) -> None:
         pytest.fail("two servers count apart")
 
 
+@pytest.mark.costly
 def test_a_second_server_of_a_league_is_refused_until_the_first_is_gone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

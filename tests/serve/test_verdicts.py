@@ -122,6 +122,7 @@ LIES: dict[str, Callable[[Path, Said], object]] = {
 }
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("lie", LIES)
 def test_what_a_judge_says_that_does_not_hold_is_not_ranked(
     court: Court, entry: bytes, lie: str, monkeypatch: pytest.MonkeyPatch

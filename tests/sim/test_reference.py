@@ -156,6 +156,7 @@ def test_a_drive_without_correction_stays_within_a_millimetre(preset):
             assert math.hypot(poses[env].x - now.x, poses[env].y - now.y) < 1e-3
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("preset", ["v4", "v5", "v6"])
 def test_randomised_cars_move_as_the_reference_says(preset):
     """Every parameter of every car different, extreme commands, slides and spins; step by step."""

@@ -99,6 +99,7 @@ def test_wrong_endings(tmp_path: Path, name: str) -> None:
         draw_track(load_track("oval"), tmp_path / name)
 
 
+@pytest.mark.costly
 def test_a_picture_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "taken.png").mkdir()
     for name, why in (("nowhere/a.png", "No such file"), ("taken.png", "Is a directory")):

@@ -123,6 +123,7 @@ def reward_function(params):
 """
 
 
+@pytest.mark.costly
 def test_prints_are_kept_up_to_the_one_before_the_error(tiny: Train, tmp_path: Path) -> None:
     source, recorder = tmp_path / "reward_function.py", Recorder()
     source.write_text(PRINTS.format(last=40))

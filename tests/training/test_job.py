@@ -59,6 +59,7 @@ def test_run_json_repeats_the_run(tiny: Train) -> None:
     assert (settings.seed, settings.until, settings.ppo) == (7, Until(steps=128, seconds=300), TINY)
 
 
+@pytest.mark.costly
 def test_metrics_and_simtrace_tell_the_same_story(tiny: Train) -> None:
     result = tiny(until="2048 steps")
     folder = RunFolder.open(result.run)
@@ -88,6 +89,7 @@ def test_tensorboard_reads_the_events(tiny: Train) -> None:
     assert [event.step for event in events.Scalars("evaluation/completion")] == [128, 256, 384, 512]
 
 
+@pytest.mark.costly
 def test_the_same_seed_gives_the_same_bits_and_another_does_not(tiny: Train) -> None:
     first, again, other = (tiny(seed=seed, until="256 steps") for seed in (3, 3, 4))
     assert_same(first.run, again.run)
@@ -138,6 +140,7 @@ def test_a_limit_of_seconds(tiny: Train) -> None:
     assert recorder.iterations[0].remaining is not None
 
 
+@pytest.mark.costly
 def test_laps_end_a_training_when_enough_trials_complete(tiny: Train, monkeypatch: pytest.MonkeyPatch) -> None:
     from racecraft.race import evaluation
     from racecraft.training import evaluator
@@ -165,6 +168,7 @@ def test_aws_own_conditions_end_a_training(tiny: Train, tmp_path: Path, conditio
     assert result.steps < 5000
 
 
+@pytest.mark.costly
 def test_a_mean_reward_of_just_the_score_is_enough(tiny: Train, tmp_path: Path) -> None:
     source = tmp_path / "reward_function.py"
     source.write_text("def reward_function(params):\n    return 0.0\n")

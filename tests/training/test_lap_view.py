@@ -84,6 +84,7 @@ def test_a_training_against_itself_is_told(tiny: Train) -> None:
     assert Training(RunFolder.open(result.run)).settings.critic == "lap"
 
 
+@pytest.mark.costly
 def test_the_teacher_of_a_long_road_and_the_critic_it_hands_on_are_told(tiny: Train) -> None:
     seen: list[tuple[bool, np.ndarray]] = []
     tell_state = TrainingEnvironment.tell_state

@@ -56,6 +56,7 @@ def test_it_learns_on_from_them_and_not_from_random_ones(tiny: Train, parent: Pa
     assert 0 < moved < 0.02 < np.abs(fresh - before[name]).max()
 
 
+@pytest.mark.costly
 def test_it_needs_its_parent_no_longer(tiny: Train, parent: Path, tmp_path: Path) -> None:
     undisturbed = tiny(parent=parent, name="undisturbed", **IDLE).run
     plan = make_plan("oval", parent=parent, until="64 steps", evaluate_every=64, num_threads=1)
@@ -102,6 +103,7 @@ def test_what_it_begins_with_is_judged_first_and_stays_the_best_where_all_that_c
         np.testing.assert_array_equal(array, theirs[name], err_msg=name)
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("algorithm", ["ppo", "distill"])
 def test_killed_before_its_first_update_it_resumes_as_if_it_never_was(
     tiny: Train, parent: Path, tmp_path: Path, algorithm: str

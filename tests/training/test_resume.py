@@ -157,6 +157,7 @@ def test_a_second_ctrl_c_stops_at_once(tiny: Train, tmp_path: Path) -> None:
     assert resume(folder.path).steps == 512
 
 
+@pytest.mark.costly
 def test_another_thread_may_stop_it(tiny: Train) -> None:
     run = tiny(until="64 steps").run
     job = Training(RunFolder.open(run), until=Until(steps=10**9))
@@ -167,12 +168,14 @@ def test_another_thread_may_stop_it(tiny: Train) -> None:
 # ---- new limits
 
 
+@pytest.mark.costly
 def test_a_new_limit_replaces_the_old_one(tiny: Train) -> None:
     run = tiny(until="128 steps").run
     assert resume(run, until="256 steps").steps == 256
     assert resume(run, until=Until(steps=320)).steps == 320
 
 
+@pytest.mark.costly
 def test_a_limit_that_was_reached_before_ends_at_once_and_says_so(tiny: Train) -> None:
     run = tiny(until="128 steps").run
     recorder = Recorder()

@@ -40,6 +40,7 @@ def test_it_begins_goes_on_and_is_replaced_among_the_objects_of_its_run(tiny: Tr
     assert resume(run, until="192 steps", reward=source).steps == 192
 
 
+@pytest.mark.costly
 def test_it_is_refused_where_nothing_stands(tiny: Train, tmp_path: Path) -> None:
     source = tmp_path / "avoids.py"
     source.write_text(AVOIDS)

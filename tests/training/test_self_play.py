@@ -80,6 +80,7 @@ def test_a_taught_run_resumes_as_if_it_never_was_once_its_lessons_are_over(tiny:
     assert weights(result.run)["teacher/learning/policy.head.weight"].any()
 
 
+@pytest.mark.costly
 def test_the_pool_spans_the_training_evenly(tiny: Train) -> None:
     result = tiny(name="pool", opponents=SELF, until="1600 steps", evaluate_every=1600)
     saved = weights(result.run)
@@ -159,6 +160,7 @@ def test_other_races_begin_on_the_grid(opponents, objects) -> None:
     assert (simulation.vehicles[3] == 0.0).all()
 
 
+@pytest.mark.costly
 def test_other_runs_drive_the_other_cars(tiny: Train) -> None:
     first = tiny(name="first", until="128 steps", evaluate_every=64)
     opponents = Opponents(drivers=(str(first.run), str(first.run)), cars=3)
@@ -171,6 +173,7 @@ def test_other_runs_drive_the_other_cars(tiny: Train) -> None:
         resume(result.run, until="320 steps")
 
 
+@pytest.mark.costly
 def test_a_checkpoint_of_other_races_is_refused(tiny: Train) -> None:
     result = tiny(name="damaged", opponents=SELF, until="128 steps", evaluate_every=128)
     folder = RunFolder.open(result.run)

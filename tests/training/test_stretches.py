@@ -21,6 +21,7 @@ OTHER = "def reward_function(params):\n    return params['speed']\n"
 THIRD = "def reward_function(params):\n    return params['progress']\n"
 
 
+@pytest.mark.costly
 def test_a_changed_reward_begins_a_stretch_and_the_old_one_stays(tiny: Train) -> None:
     run = tiny().run
     folder = RunFolder.open(run)
@@ -39,6 +40,7 @@ def test_a_changed_reward_begins_a_stretch_and_the_old_one_stays(tiny: Train) ->
     assert read_stretches(folder) == [first, second]
 
 
+@pytest.mark.costly
 def test_actions_hyperparameters_and_vehicle_belong_to_a_stretch(tiny: Train) -> None:
     folder = RunFolder.open(tiny().run)
     document = json.loads((folder.path / "run.json").read_text())
@@ -72,6 +74,7 @@ def test_another_network_is_refused_before_a_stretch_begins(tiny: Train) -> None
     assert resume(folder.path, until="576 steps").steps == 576
 
 
+@pytest.mark.costly
 def test_a_stretch_that_trained_nothing_is_forgotten(tiny: Train) -> None:
     folder = RunFolder.open(tiny().run)
     for reward in (OTHER, THIRD):
@@ -93,6 +96,7 @@ def test_what_was_driven_before_a_change_does_not_end_what_comes_after(tmp_path:
     assert again.steps > result.steps
 
 
+@pytest.mark.costly
 def test_a_reward_is_given_beside_resume(tiny: Train, tmp_path: Path) -> None:
     run = tiny().run
     (tmp_path / "other.py").write_text(OTHER)
@@ -104,6 +108,7 @@ def test_a_reward_is_given_beside_resume(tiny: Train, tmp_path: Path) -> None:
     assert RunFolder(run).read_reward_function() == OTHER
 
 
+@pytest.mark.costly
 def test_a_run_of_an_earlier_version_has_one_stretch_and_keeps_it(tiny: Train) -> None:
     folder = RunFolder.open(tiny().run)
     shutil.rmtree(folder.stretches)

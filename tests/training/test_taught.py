@@ -84,6 +84,7 @@ def test_killed_before_its_first_checkpoint_it_begins_with_the_same(tiny: Train,
         np.testing.assert_array_equal(below(TEACHERS, weights(killed.path))[name], array, err_msg=name)
 
 
+@pytest.mark.costly
 def test_what_it_is_told_beyond_that_begins_with_no_weight(tiny: Train, parent: Path, tmp_path: Path) -> None:
     """On a long road a teacher knows where it is; one of a short road is of use there, too."""
     plan = make_plan("grand_circuit", parent=parent, until="2 minutes")
@@ -182,6 +183,7 @@ def test_an_archives_teacher_of_another_shape_is_left_where_it_is(parent: Path, 
     assert open_parent(f"{odd}@last").saved.step == saved.step + 1
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(("algorithm", "log_std"), [("distill", -1.0), ("ppo", -2.5)])
 def test_who_has_lessons_begins_as_unsure_as_from_nothing(
     tiny: Train, parent: Path, tmp_path: Path, algorithm: str, log_std: float

@@ -479,6 +479,7 @@ def test_mistakes_among_objects_are_dear_for_who_drives_faster_than_a_walk(asked
     assert make_plan("oval", **asked).reward == load_preset("racing")  # type: ignore[arg-type]
 
 
+@pytest.mark.costly
 def test_a_training_among_objects_has_the_reward_and_the_actions_of_its_race(tmp_path: Path) -> None:
     ppo = PPOConfig(num_envs=2, num_steps=8, minibatch_size=16, update_epochs=1)
     boxes = Objects(obstacles=Obstacles(count=2))

@@ -81,6 +81,7 @@ def test_a_name_said_twice_is_refused() -> None:
         space("gamma", "gamma=0.9..0.95")
 
 
+@pytest.mark.costly
 def test_a_parameter_survives_its_file() -> None:
     parameter = space("gamma")["gamma"]
     assert Parameter.from_dict(parameter.to_dict()) == parameter

@@ -64,6 +64,7 @@ def test_the_numbers_are_those_of_the_kernels_headers(machine):
         assert theirs[name] == number, name
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("machine", MACHINES)
 def test_user_code_may_compute_and_nothing_else(machine):
     """Every number there is, with arguments of zero: what serving lets through is a list of harmless names."""

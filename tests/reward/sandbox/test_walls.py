@@ -255,6 +255,7 @@ DEAF = """
 """
 
 
+@pytest.mark.costly
 @pytest.mark.skipif(sys.platform != "linux", reason="a lifeline is Linux's")
 @pytest.mark.parametrize("busy", ["while True: pass", "__import__('time').sleep(60)", DEAF])
 @pytest.mark.parametrize("walls", [UNCONFINED, HERE], ids=["unconfined", "confined"])
