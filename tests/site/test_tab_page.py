@@ -17,7 +17,7 @@ import pytest
 from built_page import AXE, NEEDS_THE_PAGE, PATIENCE, Files, hosted
 
 from chromium import launched
-from few_frames import FEW_FRAMES
+from few_frames import FEW_FRAMES, HASTE
 from racecraft import evaluate
 from racecraft.importing import import_run
 from racecraft.limits import known_limit
@@ -270,6 +270,7 @@ def test_somebody_drives_a_lap_and_then_against_it(page: Page) -> None:
     page.get_by_role("combobox", name="Track").select_option("straight")
     page.get_by_role("button", name="Drive yourself").click()
     page.get_by_text("Press ↑ to drive off").wait_for()
+    page.evaluate(HASTE)
     page.keyboard.down("ArrowUp")
     page.get_by_text(re.compile("A new best: ")).first.wait_for()
     page.keyboard.up("ArrowUp")
@@ -415,19 +416,29 @@ def test_a_reward_that_raises_late_stops_with_its_line_and_leaves_what_was_judge
     page.get_by_role("button", name="Delete: kidney-own-1").wait_for()
 
 
+HURRY = """(() => {
+  const [later, again] = [window.setTimeout, window.setInterval];
+  window.setTimeout = (act, wait, ...more) => later(act, wait === 5000 && window.isHurried ? 1500 : wait, ...more);
+  window.setInterval = (act, wait, ...more) => again(act, wait === 500 && window.isHurried ? 150 : wait, ...more);
+})()"""  # the 5 s that the page waits for a reward, and the ticks by which it counts them
+
+
 def test_a_reward_that_hangs_is_ended_and_the_page_goes_on(page: Page) -> None:
     page.reload()
     page.get_by_text("It has learned already").wait_for()  # this car's life is no sign of another's
+    page.evaluate(HURRY)
     write(page, FAILS_LATE.format(ending="while True: print('again')"))
     page.get_by_text("The function is fine.").wait_for()
     page.get_by_role("combobox", name="Track").select_option(
         "kidney"
     )  # so that the text is checked again, while it trains
     page.get_by_role("button", name="Train", exact=True).click()
+    page.evaluate("window.isHurried = true")  # what is asked from here on hangs
     page.get_by_text("the reward function did not return within 5 s").wait_for()
     assert page.get_by_role("button", name="Train", exact=True).is_enabled()  # and the check had its turn
     write(page, "def reward_function(params):\n    while True: pass\n")
     page.get_by_text("1: The reward function did not return within 5 s.").wait_for()
+    page.evaluate("window.isHurried = false")
     write(page, "def reward_function(params):\n    return 1.0\n")
     page.get_by_text("The function is fine.").wait_for()
 
