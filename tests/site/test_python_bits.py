@@ -85,7 +85,7 @@ LOOKS_OUT = """def reward_function(params):
     return params["objects_distance"][ahead] + away + behind + params["objects_speed"][behind] - hit
 """
 MANY_PRINTS = """def reward_function(params):
-    for number in range(200_000):
+    for number in range(20_000):
         print(number)
     return 1.0
 """
@@ -187,10 +187,10 @@ def test_a_reward_is_tried_among_the_objects_of_its_race(found: Any, race: str) 
         assert told["reward"] == pytest.approx(ours.reward, abs=1e-8), told["name"]
 
 
-def test_millions_of_prints_leave_the_last_of_them(found: Any) -> None:
+def test_hundreds_of_thousands_of_prints_leave_the_last_of_them(found: Any) -> None:
     printed = found["prints"]["printed"]
     assert len(printed) <= 64 * 1024
-    assert printed.endswith("199998\n199999\n")
+    assert printed.endswith("19998\n19999\n")
 
 
 def test_a_package_that_the_page_has_not_names_the_installed_program(found: Any) -> None:
