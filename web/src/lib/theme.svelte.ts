@@ -17,3 +17,6 @@ export function applyTheme(choice: Theme = theme.choice): void {
 system.addEventListener("change", () => applyTheme());
 
 export const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+/** How a page scrolls to what somebody asked for. */
+export const gently = () => (isCalm() ? "instant" : "smooth");
