@@ -77,6 +77,7 @@ def test_nothing_is_kept_for_later_before_the_first_car_has_what_it_needs(tabs: 
     context.route("**/core/*.wasm", hold)
     context.set_default_timeout(PATIENCE)
     page = context.new_page()
+    page.clock.install()
     page.goto(tabs[0].url)
     page.get_by_role("button", name="Train", exact=True).wait_for()
     for _ in range(PATIENCE // 100):
@@ -84,7 +85,8 @@ def test_nothing_is_kept_for_later_before_the_first_car_has_what_it_needs(tabs: 
             break
         page.wait_for_timeout(100)
     assert held, "the core was not asked for"
-    page.wait_for_timeout(4500)  # longer than the page waits once all is there
+    page.clock.fast_forward(10_000)  # ms, longer than the page waits once all is there
+    page.wait_for_timeout(1000)  # of the browser's own time, in which it would register
     registered = "navigator.serviceWorker.getRegistration().then((one) => one !== undefined)"
     assert not page.evaluate(registered)
     for route in held:
