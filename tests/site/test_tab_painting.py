@@ -18,7 +18,7 @@ from racecraft.site.plan import plan, track_file
 from racecraft.track import load_track
 
 pytestmark = pytest.mark.slow
-TRACKS = ("trefoil", "straight")  # closed and open, with three and two steps from place to place
+TRACKS = ("reinvent_2018", "straight")  # closed and open, with four and two steps from place to place
 PRESETS = ("centerline", "racing", "stay_inside", "dodge")
 RACES = {
     "time-trial": NO_OBJECTS,
