@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from own_drives import AT, OVAL, drive, write
 
 from racecraft.agent import action_space
 from racecraft.cli.text import say_calibrated, say_replayed
@@ -20,67 +21,10 @@ from racecraft.fidelity.logs import Faults
 from racecraft.race.artifacts import write_simtrace
 from racecraft.race.evaluation import evaluate
 from racecraft.run.simtrace import COLUMNS
-from racecraft.sim import ROW_COLUMNS, STATUS_NAMES, Simulation, Start, Vehicle
+from racecraft.sim import STATUS_NAMES, Vehicle
 from racecraft.sim.logged import LogJudge, drive_windows
-from racecraft.track import load_track
 
-OVAL = load_track("oval")
 STAMPED = 15  # columns up to tstamp
-AT = {name: index for index, name in enumerate(ROW_COLUMNS)}
-
-
-def drive(*, episodes: int, direction: str = "forward", vehicle: str = "v5") -> list[list[str]]:
-    """Fields of a log of 19 columns, written from the simulation's rows."""
-    start = Start(mode="random", lateral_jitter=0.1)
-    simulation = Simulation(OVAL, camera=None, seed=4, start=start, direction=direction, vehicle=vehicle)
-    waypoints = (OVAL if direction == "forward" else OVAL.reversed()).centerline
-    rng, lines, clock = np.random.default_rng(3), [], 10.0
-    action = np.array([0.0, 1.0])
-    for episode in range(episodes):
-        simulation.reset()
-        row, is_over = simulation.rows[0].tolist(), False
-        while True:
-            behind, ahead = int(row[AT["closest_prev"]]), int(row[AT["closest_next"]])
-            here = row[AT["x"]], row[AT["y"]]
-            nearer = min((behind, ahead), key=lambda i: math.dist(waypoints[i], here))
-            clock += 1 / 15
-            status = STATUS_NAMES[int(row[AT["status"]])]
-            reward = 0.0 if status == "prepare" else row[AT["speed"]]
-            lines.append(
-                [
-                    *(str(episode), repr(row[AT["steps"]]), repr(here[0]), repr(here[1])),
-                    repr(math.degrees(row[AT["heading"]])),
-                    *(repr(math.degrees(row[AT["steering_angle"]])), repr(row[AT["speed"]]), "[1.0 2.0]"),
-                    *(repr(reward), str(is_over), str(row[AT["all_wheels_on_track"]] > 0)),
-                    "100" if row[AT["progress"]] >= 1 else repr(100 * row[AT["progress"]]),
-                    *(str(nearer), repr(OVAL.length), repr(clock), status, "0.0", "0", "1700000000.5"),
-                ]
-            )
-            if is_over:
-                break
-            s = simulation.state[0]
-            if rng.random() < 0.3:
-                action = np.array([rng.uniform(-0.3, 0.3), rng.uniform(0.8, 2.0)])
-            steer = -0.5 * s[4] - 1.2 * s[5] + 0.2 * s[9]
-            simulation.step([np.clip(action + np.array([steer, 0.0]), -0.5, 3.0)])
-            row, is_over = simulation.rows[0].tolist(), bool(simulation.terminated[0])
-    return lines
-
-
-@pytest.fixture(scope="module")
-def lines() -> list[list[str]]:
-    return drive(episodes=25)
-
-
-def write(path, lines, *, columns: int = 19, form: str = "csv"):
-    rows = [",".join(fields[:columns]) for fields in lines]
-    if form == "log":
-        rows = [f"2026-01-01 INFO something\nSIM_TRACE_LOG:{row}" for row in rows]
-    elif form == "csv":
-        rows.insert(0, ",".join(COLUMNS[:columns]))
-    data = ("\n".join(rows) + "\n").encode()
-    path.write_bytes(gzip.compress(data) if path.suffix == ".gz" else data)
-    return path
 
 
 def test_angles_of_2019_are_in_radians(lines, tmp_path):
@@ -336,87 +280,6 @@ def test_logs_as_they_come_out_of_other_tools(lines, tmp_path):
         found = replay(tmp_path / name, track="oval").to_dict()
         assert (name, found["rows"], found["broken_rows"]) == (name, len(lines), 0)
         assert found["progress_agreement"] == 1.0
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "holds no sim-trace"),
-        ("hello\nworld\n" * 100, "holds no sim-trace"),
-        ("\x00\xff" * 1000, "holds no sim-trace"),
-        ("episode,steps,X\n0,1,2\n", "lacks the column 'Y'"),
-        ("SIM_TRACE_LOG:1,2,3\n", "1 broken rows and 0 good"),
-        ("x" * 3_000_000, "holds no sim-trace"),
-    ],
-)
-def test_what_is_no_log_says_so(text, message, tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text(text, encoding="latin-1")
-    with pytest.raises(RunError, match=message):
-        replay(path, track="oval")
-
-
-@pytest.mark.parametrize("separator", [(";", "semicolons"), ("\t", "tabs")])
-@pytest.mark.parametrize("has_header", [True, False])
-def test_a_table_that_a_spreadsheet_separated_otherwise_is_told_so(separator, has_header, tmp_path, lines):
-    path = tmp_path / "a.csv"
-    mark, name = separator
-    table = [list(COLUMNS)] * has_header + [[field.replace(".", ",") for field in fields] for fields in lines]
-    path.write_text("\n".join(mark.join(fields) for fields in table))
-    with pytest.raises(RunError, match=rf"^a\.csv has {name} between its columns; a sim-trace has commas") as caught:
-        replay(path, track="oval")
-    assert "as it was logged" in caught.value.hint
-
-
-def test_files_that_cannot_be_read(tmp_path, lines):
-    with pytest.raises(RunError, match="cannot be read"):
-        replay(tmp_path / "none.csv", track="oval")
-    with pytest.raises(RunError, match="is a folder; logs are files") as error:
-        replay(tmp_path, track="oval")
-    assert error.value.hint == f"Name those in it: {tmp_path}/*.csv"
-    whole = write(tmp_path / "a.csv.gz", lines).read_bytes()
-    (tmp_path / "half.csv.gz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(RunError, match=r"half\.csv\.gz cannot be read"):
-        replay(tmp_path / "half.csv.gz", track="oval")
-
-
-def test_another_track_is_refused(lines, tmp_path):
-    path = write(tmp_path / "a.csv", lines)
-    with pytest.raises(RunError, match="was driven on a track of"):
-        replay(path, track="bowtie")
-    with pytest.raises(RunError, match="was driven on a track of"):
-        calibrate(path, track="bowtie")
-    moved = [[*fields[:2], str(float(fields[2]) + 0.4), *fields[3:]] for fields in lines]
-    with pytest.raises(RunError, match=r"was not driven on oval: \d+ % of the first .* 0.5 m off"):
-        replay(write(tmp_path / "b.csv", moved), track="oval")
-
-
-def test_logs_of_one_name_are_told_apart(lines, tmp_path):
-    for folder, length in (("0", None), ("1", "60.0")):  # workers write files of the same names
-        (tmp_path / folder).mkdir()
-        told = [[*fields[:13], length or fields[13], *fields[14:]] for fields in lines]
-        write(tmp_path / folder / "0-iteration.csv", told)
-    paths = [tmp_path / folder / "0-iteration.csv" for folder in ("0", "1")]
-    with pytest.raises(RunError, match=r"[/\\]1[/\\]0-iteration\.csv was driven on a track of 60\.00 m"):
-        replay(paths, track="oval")
-
-
-def test_too_little_to_calibrate(lines, tmp_path):
-    with pytest.raises(RunError, match="windows of 21 rows"):
-        calibrate(write(tmp_path / "a.csv", lines[:40]))
-    with pytest.raises(ConfigError, match="held_out"):
-        calibrate(write(tmp_path / "a.csv", lines), held_out=1.0)
-
-
-def test_a_log_in_which_two_workers_write_by_turns_says_so(lines, tmp_path):
-    both = [["7", *line[1:]] for line in lines]
-    path = write(tmp_path / "both.log", [row for pair in zip(lines, both, strict=True) for row in pair], form="log")
-    with pytest.warns(UserWarning, match=r"^Motion is not compared: .* 21 rows .* as a file of its own\.$"):
-        result = replay(path, track=OVAL)
-    assert (result.to_dict()["windows"], result.rules.rows) == (0, 2 * len(lines))
-    with pytest.raises(RunError) as caught:
-        calibrate(path)
-    assert "as a file of its own" in caught.value.hint
 
 
 def test_picture(lines, tmp_path):

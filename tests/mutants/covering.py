@@ -78,7 +78,10 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
     "replay/verification.py": (5, ("tests/replay/test_race_replay.py", "tests/judging/test_race_verification.py")),
     "fidelity/differences.py": (3, ("tests/fidelity/test_fidelity.py", "tests/fidelity/test_replay.py")),
     "fidelity/rules.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
-    "fidelity/logs.py": (4, ("tests/fidelity/test_replay.py", "tests/fidelity/test_fidelity.py")),
+    "fidelity/logs.py": (
+        4,
+        ("tests/fidelity/test_replay.py", "tests/fidelity/test_refused_logs.py", "tests/fidelity/test_fidelity.py"),
+    ),
     # learning
     "learn/native_loop.py": (2, ("tests/learn/test_ppo_bits.py",)),
     "learn/ppo.py": (12, LEARN),
