@@ -312,7 +312,8 @@ def _check(name: str, value: float, low: float, high: float, unit: str) -> None:
         given = f"{value:g}" if is_number(value, is_plain=False) else shown(value)
         is_slip = unit == "degrees" and is_number(value, is_plain=False) and abs(value) > 100.0
         hint = "Angles are in radians here; from_aws takes degrees." if is_slip else ""
-        raise ConfigError(f"{name} is {given}; allowed is {low:g} to {high:g} {unit}.", hint=hint)
+        allowed = f"{low:g} to {high:g} {unit}"
+        raise ConfigError(f"{name} is {given}; allowed is {allowed}.", hint=hint)
 
 
 def _degrees(radians: float) -> float:

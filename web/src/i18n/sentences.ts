@@ -11,6 +11,8 @@ interface Sentence {
 }
 
 const GAP = "{}";
+const RANGE = "{} to {}"; // no sentence, which would fit many a text, but what a gap is filled with: two numbers
+const NUMBERS = /^-?\d[\d.,]*(e[-+]?\d+)? to -?\d[\d.,]*(e[-+]?\d+)?$/;
 const DECIMAL = /^-?\d+\.(\d+)$/;
 const MANY = /^\d{1,3}(,\d{3})+$/;
 const LONGEST = 600; // characters of a line that is looked for: names are short, and a stranger's text may not be
@@ -21,7 +23,8 @@ export function translator(
   sentences: Sentences,
   number: (value: number, digits: number) => string,
 ): (text: string) => string {
-  const known = Object.entries(sentences)
+  const { [RANGE]: range = RANGE, ...whole } = sentences;
+  const known = Object.entries(whole)
     .map(([one, other]): Sentence => {
       const parts = one.split(GAP);
       const pattern = new RegExp(`^${parts.map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("(.*?)")}$`);
@@ -31,21 +34,26 @@ export function translator(
 
   /** What fills a gap: words that have a sentence of their own, or a number. */
   function filled(text: string): string {
+    if (NUMBERS.test(text)) return put(range, text.split(" to "));
     const digits = DECIMAL.exec(text)?.[1];
     if (MANY.test(text)) return number(Number(text.replaceAll(",", "")), 0);
     return digits ? number(Number(text), digits.length) : line(text);
   }
 
+  function put(other: string, gaps: string[]): string {
+    let next = 0;
+    return other.replace(/\{(\d*)\}/g, (_, place: string) => filled(gaps[place ? Number(place) : next++] ?? ""));
+  }
+
   function line(text: string): string {
-    const whole = sentences[text];
-    if (whole !== undefined && !text.includes(GAP)) return whole;
+    const same = sentences[text];
+    if (same !== undefined && !text.includes(GAP)) return same;
     if (!text || text.length > LONGEST) return text;
     for (const { parts, pattern, other } of known) {
       if (!parts.every((part) => text.includes(part))) continue;
       const gaps = pattern.exec(text)?.slice(1);
       if (!gaps || gaps.includes(text)) continue;
-      let next = 0;
-      return other.replace(/\{(\d*)\}/g, (_, place: string) => filled(gaps[place ? Number(place) : next++] ?? ""));
+      return put(other, gaps);
     }
     return text;
   }
