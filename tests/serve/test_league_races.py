@@ -29,9 +29,11 @@ from racecraft.run.checkpoint import HEADER_KEY
 from racecraft.run.starters import unpack_starter
 from racecraft.run.tensor_file import tensor_file
 from racecraft.serve.races.races import time_limit
+from racecraft.serve.settings import STATE_FOLDER
 from racecraft.serve.store.database import Database
 from racecraft.serve.store.tables import Job, Race, Submission, now
 from racecraft.serve.submissions.bench import Bench
+from racecraft.serve.submissions.tasks import REPLAY, submission_folder
 from racecraft.track import load_track
 
 pytestmark = pytest.mark.costly
@@ -437,7 +439,7 @@ def test_when_it_is_over_anybody_can_check_it(
     from racecraft.replay import read_replay, verify
 
     first = cup.drives(cup.ada, run)
-    cup.drives(cup.bob, untrained_run(tmp_path, "other", seed=2))
+    second = cup.drives(cup.bob, untrained_run(tmp_path, "other", seed=2))
     promised = ok(cup.ada.get(f"/api/boards/{cup.race}"))["race"]["commitment"]
     moment = (now()).isoformat()
     ok(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": moment}))
@@ -464,6 +466,25 @@ def test_when_it_is_over_anybody_can_check_it(
     assert checked.exit_code == 1
     assert f"{cup.names[0]}: submission {first}: its distance is 1.000000 on the board" in checked.output
     assert "is over" in refused(cup.owner.patch(f"/api/league/races/{cup.race}", json={"closes": None}), 409)
+    _lose_films(cup, first, second)
+
+
+def _lose_films(cup: Cup, first: int, second: int) -> None:
+    """One recording that is damaged or gone spoils no other's film."""
+    film = f"/api/boards/{cup.race}/film?submissions={first},{second}"
+    with database_of(cup.league) as database, database.transaction() as session:
+        jobs = {number: session.get_one(Submission, number).job_id for number in (first, second)}
+    state = cup.league.console.runs / STATE_FOLDER
+    files = {number: submission_folder(state, job) / REPLAY for number, job in jobs.items()}
+    assert ok(cup.bob.get(film))["missing"] == []
+    files[first].write_bytes(b"damaged")
+    for _ in ("damaged", "gone"):
+        told = ok(cup.bob.get(film))
+        assert [car["entry"] for car in told["cars"]] == [second]
+        assert told["missing"] == [{"entry": first, "model": cup.names[0]}]
+        files[first].unlink(missing_ok=True)
+    files[second].unlink()
+    assert "has no replay" in refused(cup.bob.get(film), 404)
 
 
 def test_films_of_an_open_race_tell_no_driver_apart(cup: Cup, run: RunFolder) -> None:

@@ -125,6 +125,12 @@ def test_a_race_from_beginning_to_end(console: RunningConsole, tmp_path: Path) -
     found = client.get(f"/api/races/{race['id']}").json()
     renamed = next(row for row in found["standings"] if row["model"] == "ada-lovelace")
     assert renamed["video"]
+    own = client.get(f"/api/races/{race['id']}/entries/{renamed['entry']}/replay").content
+    file = next(path for path in console.runs.rglob("*.replay") if path.read_bytes() == own)
+    file.write_bytes(own[:100])  # damaged; the others are shown
+    film = client.get(f"/api/races/{race['id']}/replay", params={"entries": entries}).json()
+    assert film["missing"] == [{"entry": renamed["entry"], "model": "ada-lovelace"}]
+    assert [car["entry"] for car in film["cars"]] == [row["entry"] for row in found["standings"] if row != renamed]
     refused(client.get(f"/api/races/{race['id']}/replay", params={"entries": "99999"}), 404)
     assert client.delete(f"/api/races/{race['id']}/entries/{renamed['entry']}").status_code == 204
     refused(client.delete(f"/api/races/{race['id']}/entries/{renamed['entry']}"), 404)

@@ -26,17 +26,13 @@ test("nobody reads “you” where somebody stands who has no name yet", () => {
   ]);
   const film = carsShown({
     trial: 2,
-    cars: [
-      { model: "you", laps: [7] },
-      { model: "Comet", laps: [] },
-    ],
+    cars: [{ model: "Comet", laps: [7] }],
+    missing: [{ model: "you", entry: 4 }],
   });
   expect(film).toEqual({
     trial: 2,
-    cars: [
-      { model: "no name yet", laps: [7] },
-      { model: "Comet", laps: [] },
-    ],
+    cars: [{ model: "Comet", laps: [7] }],
+    missing: [{ model: "no name yet", entry: 4 }],
   });
 });
 

@@ -28,9 +28,12 @@ export const namesShown = <T extends { name: string }>(people: T[]): T[] =>
   people.map((one) => ({ ...one, name: nameShown(one.name) }));
 
 /** The same of the cars of a film, which are called by who entered them. */
-export const carsShown = <T extends { cars: { model: string }[] }>(film: T): T => ({
+type Called = { model: string };
+const calledShown = <C extends Called>(cars: C[]): C[] => cars.map((car) => ({ ...car, model: nameShown(car.model) }));
+export const carsShown = <C extends Called, M extends Called, T>(film: T & { cars: C[]; missing: M[] }): T => ({
   ...film,
-  cars: film.cars.map((car) => ({ ...car, model: nameShown(car.model) })),
+  cars: calledShown(film.cars),
+  missing: calledShown(film.missing),
 });
 
 /** Whether somebody holds the league under no name of their own. */

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,8 @@ from racecraft.race.recording import Recording
 from racecraft.replay.replay import MAX_CELLS, read_replay
 from racecraft.serve.evaluations.objects import objects_in
 from racecraft.serve.evaluations.schemas import RoadObject
-from racecraft.serve.races.schemas import RaceReplay, ReplayCar, ReplayGhost
+from racecraft.serve.problems import NotFound
+from racecraft.serve.races.schemas import MissingCar, RaceReplay, ReplayCar, ReplayGhost
 from racecraft.serve.tracks.courses import geometry
 from racecraft.serve.tracks.schemas import TrackSector
 from racecraft.track import Track
@@ -52,6 +53,32 @@ def trial_of(
     return car_of(entry, model, cars[trial].recording, grain=grain)
 
 
+def cars_there(
+    models: Mapping[int, str], car_of: Callable[[int], ReplayCar]
+) -> tuple[list[ReplayCar], list[MissingCar]]:
+    """The drives of some entries, and the entries that have none: what became of one's file is no other's loss.
+
+    Args:
+        models: Names of the entries' models, by their numbers.
+        car_of: The drive of one of them; NotFound or ReplayError where its replay is gone or damaged.
+
+    Raises:
+        NotFound, ReplayError: None of them has one; says it of the first.
+    """
+    cars: list[ReplayCar] = []
+    missing: list[MissingCar] = []
+    problems: list[NotFound | ReplayError] = []
+    for entry, model in models.items():
+        try:
+            cars.append(car_of(entry))
+        except (NotFound, ReplayError) as error:
+            missing.append(MissingCar(entry=entry, model=model))
+            problems.append(error)
+    if not cars and problems:
+        raise problems[0]
+    return cars, missing
+
+
 def road_of(*recordings: Recording) -> list[RoadObject]:
     """Boxes and bot cars of one road, as whoever drove longest saw them."""
     return objects_in(max(recordings, key=len).rows, has_racers=False)
@@ -66,6 +93,7 @@ def replay_of(
     is_coarse: bool = False,
     objects: Sequence[RoadObject] = (),
     ghosts: Sequence[ReplayGhost] = (),
+    missing: Sequence[MissingCar] = (),
 ) -> RaceReplay:
     """The same trial of some cars.
 
@@ -77,6 +105,7 @@ def replay_of(
         is_coarse: Whether the poses are rounded so that nobody reads a driver's choices off them.
         objects: Boxes and bot cars of a road that all share.
         ghosts: Cars beside them that were not there.
+        missing: Others that were asked for and cannot be shown.
     """
     driven = driven_direction(track, [np.array(car.trace, float).reshape(-1, 3)[:, :2] / 1000 for car in cars])
     return RaceReplay(
@@ -86,5 +115,6 @@ def replay_of(
         sectors=[] if is_coarse else [TrackSector.of(sector) for sector in sectors_of(driven)],
         objects=list(objects),
         cars=cars,
+        missing=list(missing),
         ghosts=list(ghosts),
     )

@@ -17,7 +17,7 @@ from racecraft.serve.evaluations.objects import MAX_SHOWN
 from racecraft.serve.evaluations.traces import read_laps
 from racecraft.serve.problems import NotFound
 from racecraft.serve.races.ghosts import read_beside
-from racecraft.serve.races.replays import replay_of, trial_of
+from racecraft.serve.races.replays import cars_there, replay_of, trial_of
 from racecraft.serve.races.rules import rule_sets
 from racecraft.serve.races.schemas import (
     MAX_CARS,
@@ -130,7 +130,7 @@ def get_replay(
     """One trial of some entries side by side, step by step.
 
     `entries` are their ids joined by commas; by default it is the trial that the first of them is ranked by, whose
-    ghosts are beside them.
+    ghosts are beside them. Those whose replay is gone or damaged are named, and the others shown.
     """
     wanted = list(dict.fromkeys(int(part) for part in entries.split(",")))
     if len(wanted) > MAX_CARS:
@@ -138,9 +138,17 @@ def get_replay(
     race, runs = context.races.get(race_id), context.settings.runs
     driven = context.races.driven(race_id, wanted)
     chosen = _median_trial(race, wanted[0]) if trial is None else min(trial, race.trials - 1)
-    cars = [_old_car(entry, job, runs) if race.is_old else _car(entry, job, runs, chosen) for entry, job in driven]
-    ghosts = read_beside(entry_folder(runs, driven[0][1].id), trial=chosen)
-    return replay_of(race.track, context.courses.load(race.track), cars, trial=chosen, ghosts=ghosts)
+    jobs = dict(driven)
+
+    def car_of(entry: int) -> ReplayCar:
+        job = jobs[entry]
+        return _old_car(entry, job, runs) if race.is_old else _car(entry, job, runs, chosen)
+
+    cars, missing = cars_there({entry: job.run for entry, job in driven}, car_of)
+    is_first_there = cars[0].entry == driven[0][0]
+    ghosts = read_beside(entry_folder(runs, driven[0][1].id), trial=chosen) if is_first_there else []
+    track = context.courses.load(race.track)
+    return replay_of(race.track, track, cars, trial=chosen, ghosts=ghosts, missing=missing)
 
 
 def _file(context: InContext, race_id: int, entry_id: int, name: str, *, media_type: str) -> FileResponse:

@@ -224,6 +224,13 @@ class ReplayGhost(Message):
     """x, y, heading every 1/15 s in whole mm and mrad, from the cars' first step on; nothing while it is not there."""
 
 
+class MissingCar(Message):
+    """An entry whose drive cannot be shown: its replay is gone or damaged."""
+
+    entry: int
+    model: str
+
+
 class RaceReplay(Message):
     """The same trial of some entries side by side."""
 
@@ -237,4 +244,7 @@ class RaceReplay(Message):
     objects: list[RoadObject]
     """Boxes and bot cars of the road that all share, step by step; none where each drove on its own."""
     cars: list[ReplayCar]
+    """At least one."""
+    missing: list[MissingCar]
+    """That were asked for, too."""
     ghosts: list[ReplayGhost]

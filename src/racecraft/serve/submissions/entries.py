@@ -235,13 +235,15 @@ class Entries:
         path, is_over = self.driven(race_id, submission_id, user_id=user_id)
         if not is_over:
             raise Conflict("Replays are published when the race is over; until then there is the film.")
+        if not path.is_file():
+            raise NotFound(f"Submission {submission_id} has no replay.")
         return path
 
     def driven(self, race_id: int, submission_id: int, *, user_id: int | None) -> tuple[Path, bool]:
-        """The same to make a film of, also of a race whose starts everybody knows, and whether the race is over.
+        """Where it lies unless it is gone, also of a race whose starts everybody knows, and whether the race is over.
 
         Raises:
-            NotFound: There is none, or the race is not theirs to see.
+            NotFound: The race has no judged submission of that number, or the race is not theirs to see.
             Conflict: The race is not over and has a secret.
         """
         with self._database.transaction() as session:
@@ -251,10 +253,7 @@ class Entries:
             raise NotFound(f"There is no judged submission {submission_id} in this race.")
         if is_withheld(race):
             raise Conflict("What was driven in this race is shown when it is over: it tells where it starts.")
-        path = submission_folder(self._state, submission.job_id) / REPLAY
-        if not path.is_file():
-            raise NotFound(f"Submission {submission_id} has no replay.")
-        return path, state_of(race) == "closed"
+        return submission_folder(self._state, submission.job_id) / REPLAY, state_of(race) == "closed"
 
     def names(self, submissions: list[int]) -> dict[int, str]:
         """Whose submissions they are."""

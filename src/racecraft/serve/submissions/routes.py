@@ -17,8 +17,9 @@ from racecraft.limits import Medals
 from racecraft.race.entry_file import pack_entry
 from racecraft.serve.context import Computes, Consoles, InConsoles, InLeague, InPerson
 from racecraft.serve.groups.groups import require_open
-from racecraft.serve.races.replays import replay_of, trial_of
-from racecraft.serve.races.schemas import MAX_CARS, RaceReplay
+from racecraft.serve.problems import NotFound
+from racecraft.serve.races.replays import cars_there, replay_of, trial_of
+from racecraft.serve.races.schemas import MAX_CARS, RaceReplay, ReplayCar
 from racecraft.serve.schemas import RunName
 from racecraft.serve.submissions.board import Board, Row
 from racecraft.serve.submissions.data import data_of
@@ -163,19 +164,26 @@ def get_film(
     consoles: InLeague,
     submissions: Annotated[str, Query(max_length=200, pattern=r"^\d{1,9}(,\d{1,9})*$")],
 ) -> RaceReplay:
-    """The trial that the first of some submissions is ranked by, of all of them side by side, once starts are known."""
+    """The trial that the first of some submissions is ranked by, of all of them side by side, once starts are known.
+
+    Those whose replay is gone or damaged are named, and the others shown.
+    """
     entries, user = consoles.entries, request.state.user_id
     wanted = list(dict.fromkeys(int(part) for part in submissions.split(",")))
     if len(wanted) > MAX_CARS:
         raise ConfigError(f"A film shows at most {MAX_CARS} cars, {len(wanted)} were asked for.")
-    driven = [entries.driven(race_id, number, user_id=user) for number in wanted]
-    names, trial = entries.names(wanted), entries.counted_trial(wanted[0])
-    cars = [
-        trial_of(path, trial, entry=number, model=names[number], grain=1 if is_over else OPEN_GRAIN)
-        for number, (path, is_over) in zip(wanted, driven, strict=True)
-    ]
-    is_coarse = not all(is_over for _, is_over in driven)
-    return replay_of(*consoles.league.track(race_id), cars, trial=trial, is_coarse=is_coarse)
+    driven = {number: entries.driven(race_id, number, user_id=user) for number in wanted}
+    named, trial = entries.names(wanted), entries.counted_trial(wanted[0])
+
+    def car_of(number: int) -> ReplayCar:
+        path, is_over = driven[number]
+        if not path.is_file():
+            raise NotFound(f"Submission {number} has no replay.")
+        return trial_of(path, trial, entry=number, model=named[number], grain=1 if is_over else OPEN_GRAIN)
+
+    cars, missing = cars_there({number: named[number] for number in wanted}, car_of)
+    is_coarse = not all(is_over for _, is_over in driven.values())
+    return replay_of(*consoles.league.track(race_id), cars, trial=trial, is_coarse=is_coarse, missing=missing)
 
 
 @router.post(

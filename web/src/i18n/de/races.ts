@@ -102,6 +102,7 @@ export const races: Record<keyof typeof english, string> = {
   races_replay_all: "Alle zusammen zeigen",
   races_play: "Abspielen",
   races_ghost: "Geist",
+  races_film_missing: "Nicht im Film, denn die Aufzeichnung fehlt oder ist beschädigt: {models}.",
   races_pause: "Pause",
   races_scrub: "Zeitpunkt im Rennen",
   races_pace: "Tempo",

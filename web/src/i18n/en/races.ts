@@ -99,6 +99,7 @@ export const races = {
   races_replay_all: "Replay all together",
   races_play: "Play",
   races_ghost: "ghost",
+  races_film_missing: "Not in the film, as the recording is gone or damaged: {models}.",
   races_pause: "Pause",
   races_scrub: "Moment of the race",
   races_pace: "Pace",
