@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Iterable
 from typing import Any, Final
@@ -72,6 +73,17 @@ def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
 def check_type(name: str, value: Any, allowed: type | tuple[type, ...], advice: str) -> None:
     """Refuse a value of another type, saying what to give instead."""
     if not isinstance(value, allowed):
+        raise ConfigError(f"{name} is {shown(value)}; {advice}.")
+
+
+def check_path(name: str, value: Any, advice: str) -> None:
+    """Refuse what is no path: another type, or a text that no file is ever called, saying what to give instead."""
+    check_type(name, value, (str, os.PathLike), advice)
+    try:
+        is_one = b"\0" not in os.fsencode(value)
+    except (TypeError, ValueError):
+        is_one = False
+    if not is_one:
         raise ConfigError(f"{name} is {shown(value)}; {advice}.")
 
 

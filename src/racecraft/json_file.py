@@ -30,7 +30,10 @@ def open_regular(path: str | Path) -> BinaryIO:
     """
     if not isinstance(path, str | os.PathLike):  # a number would be the file that the process has open by it
         raise OSError(errno.EINVAL, "it is no path")
-    mode = os.stat(path).st_mode
+    try:
+        mode = os.stat(path).st_mode
+    except ValueError as error:  # a zero in it, or half a letter
+        raise OSError(errno.EINVAL, "it is no path") from error
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     if not stat.S_ISREG(mode):

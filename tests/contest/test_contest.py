@@ -51,6 +51,19 @@ def test_what_is_no_list_of_models_is_told(models: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"announce": 5}, "announce is 5; allowed is a function that takes an announcement"),
+        ({"changes": 5}, "changes is 5; allowed is a dict of rules by name"),
+        ({"root": "\0"}, r"root is '\\x00'; use a folder's path"),
+    ],
+)
+def test_what_is_no_setting_of_a_race_is_told_before_it_is_driven(settings: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        race_models(["a", "b"], track="oval", **settings)
+
+
+@pytest.mark.parametrize(
     "settings", [*({"seed": seed} for seed in (-1, None, 1.5)), *({"num_trials": n} for n in (1.5, "2", np.int64(2)))]
 )
 def test_a_seed_or_a_number_of_trials_that_is_none_is_told(settings: dict[str, Any]) -> None:

@@ -104,7 +104,7 @@ def test_ghosts_come_from_replays_of_the_same_road(tmp_path: Path) -> None:
         load_ghosts(["best-lap"] * 17, SLOW.conditions)
     with pytest.raises(ConfigError, match="no run"):
         load_ghosts(["@100"], SLOW.conditions)
-    for ghosts in ("best-lap", None, {"best-lap"}):
+    for ghosts in ("best-lap", None, {"best-lap"}, [5], b"best-lap"):
         with pytest.raises(ConfigError, match=r"ghosts is .*; use a list such as \['best-lap'\]"):
             load_ghosts(ghosts, SLOW.conditions)  # type: ignore[arg-type]
     with pytest.raises(RunError, match="There is no run"):

@@ -92,6 +92,11 @@ def test_what_is_no_replay_and_no_path_is_not_written(clean: Path, tmp_path: Pat
         Replay.of(5)  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="max_numbers is 'a'; allowed is a whole number"):
         read_replay(clean, max_numbers="a")  # type: ignore[arg-type]
+    for wrong in (2, -3, None, 0.5, "a"):
+        for told in (read_replay(clean).poses, read_replay(clean).actions):
+            with pytest.raises(ConfigError, match=r"^car is .*; allowed is a whole number from -2 to 1\.$"):
+                told(wrong)  # type: ignore[arg-type]
+    assert (read_replay(clean).poses(-1) == read_replay(clean).poses(1)).all()
     evaluation = read_replay(clean).evaluation
     with pytest.raises(ConfigError, match="title is 5; use a text"):
         Replay.of(evaluation, title=5)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from racecraft.errors import RewardError
+from racecraft.errors import ConfigError, RewardError
 from racecraft.reward.check import check_reward, validate_reward
 from racecraft.reward.source import MAX_CHARACTERS, load_preset, preset_names
 
@@ -302,6 +302,13 @@ FINE = [
     body("x = params.copy()", "return x.pop('speed')"),
     "import numpy as np, scipy.spatial as sp, shapely\nfrom shapely.geometry import Point\n" + body(RETURN),
 ]
+
+
+def test_what_is_no_text_is_no_source():
+    for wrong in (None, b"def reward_function(params):\n    return 1.0\n"):
+        for check in (check_reward, validate_reward):
+            with pytest.raises(ConfigError, match=r"source is .*; use the text of a reward function"):
+                check(wrong)
 
 
 @pytest.mark.parametrize("source", FINE, ids=range(len(FINE)))

@@ -36,6 +36,8 @@ SEVERAL = Objects(
         (lambda: Simulation(load_track("oval"), camera=None, objects=6), "objects is 6"),
         (lambda: objects_for_race("f1"), "Race type is 'f1'; allowed are time-trial"),
         (lambda: objects_for_race("time-trial", settings={"count": 3}), "A time trial has no objects"),
+        (lambda: objects_from_aws(5), "settings is 5; allowed is a dict of AWS's names and values"),
+        (lambda: objects_from_aws({5: "a"}), "settings is {5: 'a'}; allowed is a dict"),
         (lambda: objects_for_race("head-to-bot", settings={"sped": 3}), "Bots have no setting 'sped'"),
     ],
 )

@@ -232,6 +232,12 @@ def test_no_track_is_made_of_nonsense(change, error, words) -> None:
         Track(name="bad", centerline=rows[:, :2], inner=rows[:, 2:4], outer=rows[:, 4:])
 
 
+def test_what_is_no_array_is_no_line() -> None:
+    rows = ring()
+    with pytest.raises(ShapeError, match=r"inner of track 'bad' is 'left'; use an array \(W, 2\), metres\."):
+        Track(name="bad", centerline=rows[:, :2], inner="left", outer=rows[:, 4:])  # type: ignore[arg-type]
+
+
 def test_repr_is_short() -> None:
     assert repr(load_track("oval")) == ("Track('oval', 16.79 m x 0.90 m, closed, counter-clockwise, 113 waypoints)")
 

@@ -80,6 +80,8 @@ def test_both_directions_come_up() -> None:
         (1, {"length": 20, "width": 2}, "14 times"),
         (1, {"width": 0}, "width is 0"),
         (1, {"difficulty": 1.1}, "difficulty is 1.1"),
+        (1, {"difficulty": None}, "difficulty is None; allowed are 0 to 1"),
+        (1, {"verge": "a"}, "verge is 'a'; allowed are 0.1 to 1"),
     ],
 )
 def test_what_cannot_be_is_refused(seed, options, words) -> None:

@@ -2,12 +2,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from racecraft.errors import TrackError
+from racecraft.errors import ConfigError, TrackError
 from racecraft.track import TrackPicture, draw_contact_sheet, draw_track, generate_track, load_track, track_names
 from racecraft.track.canvas import Canvas, text_width
 from racecraft.track.road_art import ROAD, Ribbon
@@ -97,6 +98,8 @@ def test_an_umlaut_is_its_letter_and_two_dots(letter: str, base: str, anchor: st
 def test_wrong_endings(tmp_path: Path, name: str) -> None:
     with pytest.raises(TrackError, match="must end in"):
         draw_track(load_track("oval"), tmp_path / name)
+    with pytest.raises(ConfigError, match="path is 5; use a file's path"):
+        draw_track(load_track("oval"), 5)  # type: ignore[arg-type]
 
 
 @pytest.mark.costly
@@ -109,8 +112,8 @@ def test_a_picture_that_cannot_be_written_is_told(tmp_path: Path) -> None:
             draw_contact_sheet([load_track("oval")], tmp_path / name)
 
 
-@pytest.mark.parametrize("width_px", [0, -5, 100, 10**9])
-def test_wrong_sizes(tmp_path: Path, width_px: int) -> None:
+@pytest.mark.parametrize("width_px", [0, -5, 100, 10**9, None, "640", 640.5])
+def test_wrong_sizes(tmp_path: Path, width_px: Any) -> None:
     with pytest.raises(TrackError, match="allowed are 320 to 6000"):
         draw_track(load_track("oval"), tmp_path / "track.png", width_px=width_px)
     with pytest.raises(TrackError, match="allowed are"):

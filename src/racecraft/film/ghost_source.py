@@ -86,7 +86,8 @@ def check_sources(
 
 
 def _check_number(sources: Sequence[str]) -> None:
-    if isinstance(sources, str) or not isinstance(sources, Sequence):
+    is_list = isinstance(sources, Sequence) and not isinstance(sources, str | bytes)
+    if not is_list or not all(isinstance(source, str) for source in sources):
         check_type("ghosts", sources, (), f"use a list such as [{BEST_LAP!r}]")
     if len(sources) > MAX_GHOSTS:
         raise ConfigError(f"There are {len(sources)} ghosts; allowed are up to {MAX_GHOSTS}.")

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from racecraft.checks import check_path
 from racecraft.errors import ConfigError, RunError
 from racecraft.film.ghost import Ghost
 from racecraft.film.ghost_source import check_sources, load_ghosts
@@ -171,6 +172,8 @@ def evaluate_run(
     Raises:
         RacecraftError: The run, its checkpoint, the track or a setting is not usable.
     """
+    if aws_log is not None:
+        check_path("aws_log", aws_log, "use a file's path, or '-'")
     folder = RunFolder.open(run)
     info = folder.read_info()
     if rules is None and folder.race_rules.exists():

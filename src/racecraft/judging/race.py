@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-from racecraft.checks import check_type
+from racecraft.checks import check_path, require
 from racecraft.contest.contest import Contest, hold_race
 from racecraft.contest.terms import race_terms
 from racecraft.errors import RunError
@@ -109,7 +108,9 @@ def race_models(
         RacecraftError: A model, the track or a setting is not usable, or nothing can be written.
     """
     check_models(models)
-    check_type("root", root, (str, PathLike), "use a folder's path")
+    require("announce", announce, callable(announce), "a function that takes an announcement")
+    require("changes", changes, changes is None or isinstance(changes, dict), "a dict of rules by name")
+    check_path("root", root, "use a folder's path")
     given = {"laps": laps, **(changes or {})}
     conditions = Conditions(
         track=track if isinstance(track, Track) else load_track(track),

@@ -101,12 +101,20 @@ class Replay:
         return max(len(car.recording) for car in self.cars)
 
     def poses(self, car: int) -> NDArray[np.float64]:
-        """X [m], y [m] and heading [rad] of a car's origin at every step, 15 a second, a copy  (T, 3)."""
-        return self.cars[car].recording.poses.copy()
+        """X [m], y [m] and heading [rad] of a car's origin at every step, 15 a second, a copy  (T, 3).
+
+        Raises:
+            ConfigError: There is no such car; they count from 0, and -1 is the last one.
+        """
+        return self._car(car).recording.poses.copy()
 
     def actions(self, car: int) -> NDArray[np.float32]:
-        """Steering angle [rad] and speed [m/s] that the driver asked for, a copy  (T, 2)."""
-        return self.cars[car].recording.actions.copy()
+        """Steering angle [rad] and speed [m/s] that the driver asked for, a copy  (T, 2); cars as for `poses`."""
+        return self._car(car).recording.actions.copy()
+
+    def _car(self, car: int) -> Trial:
+        check_whole("car", car, -len(self.cars), len(self.cars) - 1)
+        return self.cars[car]
 
     def events(self) -> Iterator[tuple[int, int, str]]:
         """Car, step and kind of everything that happened, car by car."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final, Literal
 
+from racecraft.checks import check_type
 from racecraft.errors import RewardError, did_you_mean, printable
 from racecraft.reward.imports import ImportRules
 from racecraft.reward.keys import missing_keys
@@ -54,7 +55,12 @@ class Problem:
 
 @reads
 def check_reward(source: str) -> list[Problem]:
-    """The problems that can be seen in the source, in the order of its lines; of very many the first that are found."""
+    """The problems that can be seen in the source, in the order of its lines; of very many the first that are found.
+
+    Raises:
+        ConfigError: The source is no text.
+    """
+    check_type("source", source, str, "use the text of a reward function, which load_reward(path) reads")
     try:
         with scoped_warnings("ignore"):  # Python's own are caught where the source is parsed
             problems = list(islice(_problems(source), MAX_PROBLEMS))

@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from racecraft.checks import check_type, shown
+from racecraft.checks import check_path, check_type, shown
 from racecraft.errors import ConfigError, RunError, did_you_mean, quoted, typed
 from racecraft.json_file import read_json_object, read_text
 from racecraft.moved import place_of
@@ -98,7 +98,7 @@ class RunFolder:
             RunError: The name is not allowed or taken, or the folder cannot be made.
             ConfigError: The name is no text, or the root no path.
         """
-        check_type("root", root, (str, os.PathLike), "use a folder's path")
+        check_path("root", root, "use a folder's path")
         root = Path(root)
         if name is not None:
             names = [checked_name(name)]

@@ -204,6 +204,8 @@ def objects_from_aws(settings: Mapping[str, Any]) -> Objects:
     Raises:
         ConfigError: Names the setting and its value.
     """
+    is_named = isinstance(settings, Mapping) and all(isinstance(name, str) for name in settings)
+    require("settings", settings, is_named, "a dict of AWS's names and values")
     named = {aws_object_setting(name): (name, value) for name, value in settings.items()}
     race_type = str(named.get("RACE_TYPE", ("", "TIME_TRIAL"))[1])
     given: dict[str, Any] = {}

@@ -16,6 +16,7 @@ import random
 
 import numpy as np
 
+from racecraft.checks import is_number
 from racecraft.errors import TrackError
 from racecraft.track.curve import Corner, road_along, trace_corners
 from racecraft.track.polyline import Floats, arc_length, resample, signed_area, wrap_angle
@@ -62,8 +63,7 @@ def generate_track(
     """
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**63:
         raise TrackError(f"seed is {seed!r}; allowed are integers from 0.")
-    options = {"length": length, "width": width, "difficulty": difficulty if difficulty != 0.5 else None}
-    options |= {"radius": radius, "verge": verge}
+    options = {"length": length, "width": width, "difficulty": difficulty, "radius": radius, "verge": verge}
     ranges = {
         "length": (MIN_LENGTH, MAX_LENGTH),
         "width": (MIN_WIDTH, MAX_WIDTH),
@@ -73,8 +73,12 @@ def generate_track(
     }
     for key, value in options.items():
         lowest, highest = ranges[key]
-        if value is not None and not lowest <= value <= highest:
+        if value is None and key != "difficulty":
+            continue
+        if value is None or not is_number(value, is_plain=False) or not lowest <= value <= highest:
             raise TrackError(f"{key} is {value!r}; allowed are {lowest:g} to {highest:g}.")
+    if difficulty == 0.5:
+        del options["difficulty"]  # which the name need not say
     rng = random.Random(int(seed))  # only its random(), whose sequence Python promises to keep
     road_width = _between(rng, 0.7, 1.1) if width is None else float(width)
     lap = max(_between(rng, 16.0, 45.0) + 12.0 * difficulty * rng.random(), 1.2 * SHORTEST_LAP * road_width)

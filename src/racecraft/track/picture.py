@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from racecraft.checks import check_type
+from racecraft.checks import check_path, check_type
 from racecraft.errors import TrackError
 from racecraft.track.canvas import Canvas, text_width
 from racecraft.track.corners import TrackCorner, find_corners
@@ -65,8 +65,7 @@ class TrackPicture:
     """
 
     def __init__(self, track: Track, *, width_px: int = 1600, has_numbers: bool = True) -> None:
-        if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
-            raise TrackError(f"width_px is {width_px!r}; allowed are {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
+        _check_width(width_px)
         self.track = track
         self.corners = find_corners(track)
         self._unit = unit = width_px / 100.0  # everything that is not road is measured in hundredths of the width
@@ -250,8 +249,7 @@ def draw_contact_sheet(
         raise TrackError("A contact sheet needs at least one track.")
     if not 1 <= columns <= 12:
         raise TrackError(f"columns is {columns!r}; allowed are 1 to 12.")
-    if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
-        raise TrackError(f"width_px is {width_px!r}; allowed are {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
+    _check_width(width_px)
     margin = round(width_px * 0.03)
     cell = (width_px - 2 * margin) // columns
     head = round(width_px * 0.07) if title else margin
@@ -335,7 +333,13 @@ def _fitted(
     canvas.text(place, words, SOFT_INK if is_soft else INK, size=size, weight=weight)
 
 
+def _check_width(width_px: int) -> None:
+    if not isinstance(width_px, int | np.integer) or not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
+        raise TrackError(f"width_px is {width_px!r}; allowed are {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
+
+
 def _image_path(path: str | Path) -> Path:
+    check_path("path", path, "use a file's path")
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise TrackError(f"Cannot write a picture to {path.name!r}; the name must end in one of {', '.join(SUFFIXES)}.")

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from racecraft.checks import shown
 from racecraft.errors import ShapeError, TrackError
 from racecraft.track.polyline import (
     Floats,
@@ -63,7 +64,7 @@ class Track:
     between equal points, but they are counted: AWS's waypoint indices, in logs and rewards, are those of the file."""
 
     def __post_init__(self) -> None:
-        lines = {name: np.array(getattr(self, name), dtype=np.float64) for name in ("centerline", "inner", "outer")}
+        lines = {name: self._line(name) for name in ("centerline", "inner", "outer")}
         shape = lines["centerline"].shape
         for name, line in lines.items():
             if line.shape != shape or line.ndim != 2 or line.shape[1] != 2:
@@ -86,6 +87,13 @@ class Track:
                 line[-1] = line[0]
             line.flags.writeable = False
             object.__setattr__(self, name, line)
+
+    def _line(self, name: str) -> Floats:
+        line = getattr(self, name)
+        try:
+            return np.array(line, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ShapeError(f"{name} of track {self.name!r} is {shown(line)}; use an array (W, 2), metres.") from error
 
     def __repr__(self) -> str:
         shape = "closed" if self.is_closed else "open"
