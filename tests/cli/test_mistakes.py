@@ -169,6 +169,21 @@ def test_what_an_error_says_is_no_markup(racecraft: Run, tmp_path: Path) -> None
     assert "[bold]x[/bold]" in racecraft("train", "--critic", "[bold]x[/bold]").err
 
 
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ("train --model-metadata m.json --actions safe", "--actions does not go with --model-metadata"),
+        ("train --model-metadata m.json --sensors LIDAR", "--sensors does not go with --model-metadata"),
+        ("tune --model-metadata m.json --actions safe", "--actions does not go with --model-metadata"),
+        ("tune --for speed", "--for is 'speed'; allowed are laps, lap_time."),
+    ],
+)
+def test_options_are_called_as_they_were_typed(racecraft: Run, command: str, says: str) -> None:
+    told = racecraft(*command.split())
+    assert told.status != 0
+    assert says in " ".join(told.err.replace("│", " ").split())
+
+
 @pytest.mark.costly
 def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     command = f"{sys.executable} -m racecraft tracks | true"

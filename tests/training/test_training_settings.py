@@ -260,13 +260,39 @@ def test_ppo_can_be_given_whole_but_not_beside_hyperparameters() -> None:
         ({"sensors": 5}, "sensors is 5; use a list of AWS's sensor names."),
         ({"sensors": "LIDAR"}, "sensors is 'LIDAR'; use a list of AWS's sensor names."),
         ({"aws_log": 5}, "aws_log is 5; use a file's path, or '-'."),
+        ({"aws_log": "\0"}, "aws_log is '\\x00'; use a file's path, or '-'."),
+        ({"root": "a\0b"}, "root is 'a\\x00b'; use a folder's path."),
+        (
+            {"reporter": 5},
+            "reporter is 5; use an object with the methods begin, note, step, iteration, evaluation, such as a "
+            "racecraft.training.SilentReporter().",
+        ),
+        ({"started": "x"}, "started is 'x'; allowed is a time of time.monotonic(), in seconds."),
+        ({"algorithm": []}, "algorithm is []; use a name such as 'ppo'."),
+        ({"tells_nearby": 5}, "tells_nearby is 5; allowed are True and False."),
+        (
+            {"model_metadata": "m.json", "actions": "safe"},
+            "actions and model_metadata both say what a car's actions are; give one of them.",
+        ),
+        (
+            {"model_metadata": "m.json", "sensors": ["LIDAR"]},
+            "sensors and model_metadata both say what a car's sensors are; give one of them.",
+        ),
+        ({"model_metadata": "\0"}, "\ufffd cannot be read: it is no path."),
     ],
 )
 def test_arguments_of_another_kind_are_refused(tmp_path: Path, given: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError) as refusal:
-        train("oval", root=tmp_path / "runs", **given)
+        train("oval", **{"root": tmp_path / "runs", **given})
     assert str(refusal.value) == says
     assert not (tmp_path / "runs").exists()
+
+
+def test_awss_file_goes_before_the_actions_of_a_recipe(tmp_path: Path) -> None:
+    (tmp_path / "m.json").write_text(json.dumps(DISCRETE.to_dict()))
+    with pytest.raises(ConfigError, match="distill") as refusal:
+        train("oval", recipe="steady", model_metadata=tmp_path / "m.json", algorithm="sb3:distill", root=tmp_path)
+    assert "both say" not in str(refusal.value)
 
 
 def test_a_seed_of_numpy_s_is_a_number_that_json_knows() -> None:

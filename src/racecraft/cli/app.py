@@ -91,3 +91,12 @@ def is_given(context: typer.Context, *options: str) -> bool:
     """Whether one of these options was typed."""
     sources = [context.get_parameter_source(option) for option in options]
     return any(source is not None and source.name == "COMMANDLINE" for source in sources)
+
+
+def refuse_beside_metadata(context: typer.Context) -> None:
+    """AWS's file says what a car sees and does: an option that says it, too, would have no effect."""
+    if not is_given(context, "model_metadata"):
+        return
+    for option in context.command.params:
+        if option.name in ("actions", "sensors") and is_given(context, option.name):
+            context.fail(f"{option.opts[0]} does not go with --model-metadata, which says that, too; give one of them.")

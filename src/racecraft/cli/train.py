@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from racecraft.cli import race_options
-from racecraft.cli.app import INTERRUPTED, AwsLog, Json, app, is_given, print_json, text
+from racecraft.cli.app import INTERRUPTED, AwsLog, Json, app, is_given, print_json, refuse_beside_metadata, text
 
 if TYPE_CHECKING:
     from racecraft.training.terminal import TerminalReporter
@@ -67,7 +67,7 @@ def train(
     ] = "",
     model_metadata: Annotated[
         Path | None,
-        typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions and --sensors."),
+        typer.Option("--model-metadata", help="AWS's model_metadata.json, in place of --actions and --sensors."),
     ] = None,
     hyperparameters: Annotated[
         Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json; trains as AWS did.")
@@ -128,6 +128,7 @@ def train(
         context.fail("--json and --aws-log - both want stdout; give the log a file.")
     if resume is not None:
         _refuse_beside_resume(context)
+    refuse_beside_metadata(context)
     from racecraft import training
     from racecraft.sim import slower_than_could_be
     from racecraft.training.progress import NotingReporter

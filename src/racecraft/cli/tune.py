@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json, text
+from racecraft.cli.app import INTERRUPTED, Json, app, is_given, print_json, refuse_beside_metadata, text
 
 _OF_A_CALL = ("resume", "minutes", "trials", "processes", "as_json")
 
@@ -33,7 +33,7 @@ def tune(
         str, typer.Option("--actions", help="Action space: default, aws, fast, safe, steady or continuous.")
     ] = "default",
     model_metadata: Annotated[
-        Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json; replaces --actions.")
+        Path | None, typer.Option("--model-metadata", help="AWS's model_metadata.json, in place of --actions.")
     ] = None,
     hyperparameters: Annotated[
         Path | None, typer.Option("--hyperparameters", help="AWS's hyperparameters.json, where the search begins.")
@@ -60,15 +60,18 @@ def tune(
         for option in context.command.params:
             if is_given(context, str(option.name)) and option.name not in _OF_A_CALL:
                 context.fail(f"{option.opts[0]} does not go with --resume: a search keeps what it was started with.")
+    refuse_beside_metadata(context)
+    from racecraft.checks import check_choice
     from racecraft.cli import tune_text
     from racecraft.training.plan import make_plan
-    from racecraft.tuning import Tuning, check_limits, make_tuning
+    from racecraft.tuning import GOALS, Tuning, check_limits, make_tuning
 
+    check_choice("--for", goal, GOALS)
     check_limits(minutes=minutes, max_trials=trials, processes=processes)
     folder, notes = resume, tuple[str, ...]()
     if folder is None:
         options: dict[str, Any] = {"track": track, "reward": reward, "actions": actions}
-        if parent is not None:  # what is not given is the parent's
+        if parent is not None or model_metadata is not None:  # what is not given is the parent's or the file's
             options = {name: value for name, value in options.items() if is_given(context, name)}
         plan = make_plan(
             **options,

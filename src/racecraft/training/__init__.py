@@ -94,16 +94,18 @@ def train(
     """
     import time
 
-    from racecraft.checks import check_type
-    from racecraft.training.job import Training
+    from racecraft.training.job import Training, check_listeners
     from racecraft.training.plan import make_plan
     from racecraft.training.recipes import with_recipe
 
-    check_type("aws_log", aws_log, (str, Path, type(None)), "use a file's path, or '-'")
+    check_listeners(reporter, aws_log, started)
     started = time.monotonic() if started is None else started
     given = {"track": track, "reward": reward, "until": until, "actions": actions, **settings}
+    chosen = with_recipe(recipe, given)
+    if model_metadata is not None:
+        chosen["actions"] = actions  # the file goes before a recipe's
     plan = make_plan(
-        **with_recipe(recipe, given),
+        **chosen,
         sensors=sensors,
         model_metadata=model_metadata,
         hyperparameters=hyperparameters,
@@ -148,8 +150,9 @@ def resume(
     """
     from racecraft.reward import load_reward
     from racecraft.run import RunFolder
-    from racecraft.training.job import Training
+    from racecraft.training.job import Training, check_listeners
 
+    check_listeners(reporter, aws_log, started)
     if isinstance(until, str):
         until = Until.parse(until)
     folder = RunFolder.open(run)

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.agent import ModelMetadata
-from racecraft.errors import CheckpointError, RacecraftError, RewardError, typed
+from racecraft.checks import check_path, is_number, require, shown
+from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RewardError, typed
 from racecraft.learn import Algorithm, Distill, IterationStats
 from racecraft.run import CheckpointWarning, RunFolder
 from racecraft.scoped_warnings import scoped_warnings
@@ -29,6 +30,22 @@ from racecraft.training.progress import Reporter, SilentReporter, TrainResult
 from racecraft.training.session import Session, open_session
 from racecraft.training.start import read_settings
 from racecraft.training.stop import Until
+
+
+def check_listeners(reporter: Reporter | None, aws_log: str | Path | None, started: float | None) -> None:
+    """Refuse what cannot be told how a training goes, and a beginning that is no time.
+
+    Raises:
+        ConfigError: It cannot; the arguments are those of `racecraft.train`.
+    """
+    told = [name for name, method in vars(Reporter).items() if not name.startswith("_") and callable(method)]
+    if reporter is not None and not all(callable(getattr(reporter, name, None)) for name in told):
+        advice = f"use an object with the methods {', '.join(told)}, such as a racecraft.training.SilentReporter()"
+        raise ConfigError(f"reporter is {shown(reporter)}; {advice}.")
+    if aws_log is not None:
+        check_path("aws_log", aws_log, "use a file's path, or '-'")
+    if started is not None:
+        require("started", started, is_number(started), "a time of time.monotonic(), in seconds")
 
 
 class Training:

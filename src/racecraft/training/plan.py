@@ -11,6 +11,7 @@ import numpy as np
 
 from racecraft.agent import ActionSpace, Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
+from racecraft.errors import ConfigError
 from racecraft.learn import PPOConfig
 from racecraft.reward import load_reward
 from racecraft.run import RunFolder
@@ -87,6 +88,7 @@ def make_plan(
     """
     if isinstance(seed, np.integer):
         seed = int(seed)  # JSON, in which a run keeps it, does not know NumPy's
+    check_type("algorithm", algorithm, str, "use a name such as 'ppo'")
     check_type("ppo", settings.get("ppo"), (PPOConfig, type(None)), "use racecraft.learn.PPOConfig(...)")
     if parent is not None and not isinstance(parent, Parent):
         parent = open_parent(parent)
@@ -151,6 +153,9 @@ def _metadata(
 ) -> ModelMetadata:
     """What the policy sees and does: as a file says, or the parent, or what suits the kind of training."""
     if file is not None:
+        for name, given in (("actions", actions), ("sensors", sensors)):
+            if given:
+                raise ConfigError(f"{name} and model_metadata both say what a car's {name} are; give one of them.")
         return _with_algorithm(ModelMetadata.load(file), algorithm)
     check_type("sensors", sensors, (list, tuple), "use a list of AWS's sensor names")
     space = action_space(actions) if isinstance(actions, str) else actions

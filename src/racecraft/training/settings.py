@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata
-from racecraft.checks import check_choice, check_type, check_whole
+from racecraft.checks import check_choice, check_flag, check_type, check_whole
 from racecraft.errors import ConfigError, RunError, did_you_mean
 from racecraft.learn import DistillConfig, NetworkSpec, PPOConfig, SACConfig, network_names
 from racecraft.learn.networks import PERCEPTION
@@ -128,6 +128,7 @@ class TrainSettings:
             ("num_threads", self.num_threads, 0, 1024),
         ):
             check_whole(name, value, low, high, is_plain=True)
+        check_flag("tells_nearby", self.tells_nearby)
         self.randomize.check(self.vehicle, CAMERAS[self.camera])
         for name, (config, room) in _KINDS.items():
             check_type(name, getattr(self, name), config, f"use {room}.{config.__name__}(...)")

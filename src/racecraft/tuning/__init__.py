@@ -9,9 +9,10 @@ from racecraft.tuning.constants import find_constants, rewrite_constants
 from racecraft.tuning.outcome import Outcome, TrialOutcome
 from racecraft.tuning.space import HYPERPARAMETERS, Parameter, make_space
 from racecraft.tuning.start import make_tuning, plan_of, space_of, start_tuning
-from racecraft.tuning.study import Tuning, check_limits
+from racecraft.tuning.study import GOALS, Tuning, check_limits
 
 __all__ = [
+    "GOALS",
     "HYPERPARAMETERS",
     "Outcome",
     "Parameter",
