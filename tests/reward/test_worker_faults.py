@@ -93,9 +93,25 @@ def test_what_numpy_no_longer_makes_a_number_of_is_told_with_what_to_write_inste
         worker(rows)
     assert "since 2.4" in caught.value.hint
     assert "array.item()" in caught.value.hint
-    with running(function("return 1 / 0"), track) as worker, pytest.raises(RewardError) as caught:
+
+
+HINTED = (
+    (("there = params['objects_location']", "return there[0][0]"), ""),
+    (("return params['objects_location'][0][0]",), "Choose a race with objects"),
+    (("return 1.0 / [2.0, 3.0][params['steps']]",), "int(params['steps'])"),
+    (("return float(sum(range(params['steps'])))",), "int(params['steps'])"),
+    (("return params.has_key('speed')",), "Write 'speed' in params"),
+    (("return [1.0][2]",), ""),
+    (("return 1 / 0",), ""),
+)
+
+
+@pytest.mark.parametrize(("body", "hint"), HINTED)
+def test_what_fails_here_as_at_aws_is_told_with_what_to_write_instead(track, rows, body, hint):
+    with running(function(*body), track) as worker, pytest.raises(RewardError) as caught:
         worker(rows)
-    assert caught.value.hint == ""
+    assert hint in caught.value.hint
+    assert bool(hint) == bool(caught.value.hint)
 
 
 def test_the_row_at_fault_is_named(track, rows):

@@ -30,6 +30,12 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 MAX_PROBLEMS: Final = 1000
 MAX_PARTS: Final = 100
 """Of a dotted name: Python's own parser takes seconds for an import of 46,000."""
+SIGNS: Final = {
+    r"^invalid (non-printable )?character": "A page or a chat that it was copied from put another sign there: type "
+    "spaces, quotes and minus on the keyboard again.",
+    r"inconsistent use of tabs": "Indent all lines with spaces alone, four for each step.",
+}
+"""What to do about signs in a source, by what Python says of them: patterns."""
 _CHAIN: Final = re.compile(rf"(?<![\w.])(?:[^\W\d]\w*+[\s\\]*+\.[\s\\]*+){{{MAX_PARTS}}}")
 
 
@@ -117,7 +123,10 @@ def _parse(source: str) -> tuple[ast.Module | None, list[Problem]]:
             tree = None
             is_question = error.msg.endswith("?")  # Did you mean print(...)?
             message = f"{type(error).__name__}: {error.msg}" + ("" if is_question else ".")
-            findings.append(Problem(max(error.lineno or 1, 1), max(error.offset or 1, 1), message))
+            hint = next((hint for pattern, hint in SIGNS.items() if re.search(pattern, error.msg)), "")
+            if "```" in (error.text or ""):
+                hint = "It is the frame of a text that shows a program: leave out the lines with ```."
+            findings.append(Problem(max(error.lineno or 1, 1), max(error.offset or 1, 1), message, hint))
         except ValueError as error:  # a NUL, or half of a surrogate pair
             tree = None
             findings.append(Problem(1, 1, f"The source is not text that Python reads: {error}."))

@@ -5,6 +5,7 @@ The same for a function in a worker process and for one in a browser's tab, whic
 
 from __future__ import annotations
 
+import re
 from typing import Any, Final
 
 from racecraft.errors import printable
@@ -16,15 +17,20 @@ SHOWN_WIDTH: Final = 200  # characters of such a line
 SHOWN_BYTES: Final = 4 * SHOWN_LINES * SHOWN_WIDTH  # that hold them
 
 HINTS: Final = {
-    "only 0-dimensional arrays can": "NumPy makes a number only of an array without dimensions, since 2.4. "
+    r"only 0-dimensional arrays can": "NumPy makes a number only of an array without dimensions, since 2.4. "
     "Write array[0] or array.item() where it has one element.",
+    r"IndexError: .*\n    .*object(?!(?s:.*)'objects_location':)": "Nothing is on this track, so the lists of objects "
+    "are empty, as at AWS. Choose a race with objects, or ask first for len(params['objects_location']).",
+    r"TypeError: (.*indices must be integers .*not float|'float' object cannot be interpreted as an integer)": "What "
+    "params count, such as steps, are floats, as at AWS. Write int(params['steps']).",
+    r"AttributeError: 'dict' object has no attribute 'has_key'": "That was Python 2. Write 'speed' in params.",
 }
-"""What to do about it, by a part of what an exception says."""
+"""What to do about it, by what a failure that is told in full says: patterns."""
 
 
 def hint_about(text: str) -> str:
-    """What to do about a failure, where its text does not say it."""
-    return next((hint for part, hint in HINTS.items() if part in text), "")
+    """What to do about a failure, where what is `told` of it does not say it."""
+    return next((hint for pattern, hint in HINTS.items() if re.search(pattern, text)), "")
 
 
 def told(text: str, source: str, *, line: int, is_loading: bool, params: dict[str, Any] | None, printed: str) -> str:

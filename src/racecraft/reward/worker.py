@@ -359,7 +359,7 @@ class RewardWorker:
         message = told(text, self._source, line=line, is_loading=rows is None, params=params, printed=printed)
         return RewardError(
             message,
-            hint=hint_about(text),
+            hint=hint_about(message),
             line=line if line > 0 else None,
             row_index=None if rows is None else first + row,
             params=params,
