@@ -80,6 +80,42 @@ def test_the_hint_for_a_file_of_another_name(tmp_path: Path) -> None:
     assert caught.value.hint == "Did you mean 'custom_files/reward_v3.py'?"
 
 
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("Reward_Function.py", "reward_function.py"),
+        ("my model/reward_function (1).py", "reward_function.py"),
+        ("reward_function - Copy.py", "reward_function.py"),
+        ("reward_function.py.txt", "reward_function.py"),
+        ("reward.py", "reward_function.py"),
+        ("MODEL_METADATA.JSON", "model_metadata.json"),
+    ],
+)
+def test_the_hint_for_a_file_that_a_copy_or_an_editor_called_otherwise(name: str, meant: str, tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="nothing that is understood") as caught:
+        import_run(models.as_folder({name: models.REWARD, "notes.txt": "mine"}, tmp_path / "m"))
+    assert caught.value.hint == f"Is {name!r} meant? Call it {meant}."
+    if meant == "reward_function.py":
+        with pytest.raises(SourceError, match=r"has no reward_function\.py") as caught:
+            import_run(models.as_folder({name: models.REWARD, "model_metadata.json": models.METADATA}, tmp_path / "n"))
+        assert caught.value.hint == f"Is {name!r} meant? Call it {meant}."
+
+
+def test_the_hint_for_an_archive_inside(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="nothing that is understood") as caught:
+        import_run(models.as_folder({"down/model.tar.gz": "packed", "notes.txt": "mine"}, tmp_path / "m"))
+    assert caught.value.hint == "It holds an archive, 'down/model.tar.gz': unpack it and import that."
+
+
+def test_settings_that_are_called_otherwise_are_told(tmp_path: Path) -> None:
+    files = {"reward_function.py": models.REWARD, "hyperparameters (1).json": "{}", "notes.txt": "mine"}
+    found = import_run(models.as_folder(files, tmp_path / "m"), track="oval")
+    assert found.unused == {
+        "hyperparameters (1).json (2 bytes)": "the original's file has another name: give it that if it is to be read",
+        "notes.txt (4 bytes)": "nothing that is read",
+    }
+
+
 def test_the_hint_for_a_world_that_is_not_here(tmp_path: Path) -> None:
     with pytest.raises(RacecraftError) as caught:
         import_run(models.as_folder({**models.DRFC, "run.env": "DR_WORLD_NAME=reinvent_base"}, tmp_path / "d"))

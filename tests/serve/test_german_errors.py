@@ -54,7 +54,7 @@ REPORTS = (
     *("training/plan.py", "training/parent.py"),
 )
 """Where what a page tells of an import, of a car, or of what a training begins with, comes from."""
-TOLD = {"used", "unused", "becomes", "without_effect", "NO_EFFECT", "ELSEWHERE", "RACES", "_WHY"}
+TOLD = {"used", "unused", "becomes", "without_effect", "NO_EFFECT", "ELSEWHERE", "RACES", "_WHY", "_WHY_MISNAMED"}
 """What such a file calls its tables of these."""
 PLAIN = re.compile(
     r"(Value|Type|Key|Attribute|Assertion|Runtime|OS|Stop)\w*|HTTPException|SystemExit|BadParameter|NoAnswer"

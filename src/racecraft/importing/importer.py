@@ -34,6 +34,7 @@ from racecraft.importing.layout import (
     SYSTEM_ENV,
     TRAINING_PARAMS,
     find_root,
+    hint_at,
     is_below,
     is_of_others,
     role,
@@ -346,7 +347,8 @@ def _read_reward(model: _Model, reward: str | Path) -> str:
             )
         raise SourceError(
             f"{model.source.title} has no {REWARD}, without which nothing can be trained.",
-            hint="Give one with --reward: a file, or a preset such as centerline; 'racecraft reward list' lists them.",
+            hint=hint_at(model.source.files, (REWARD,))
+            or "Give one with --reward: a file, or a preset such as centerline; 'racecraft reward list' lists them.",
         )
     else:
         text = model.source.text(name)

@@ -43,6 +43,13 @@ _MARKS: Final = sorted({place for places in PLACES.values() for place in places}
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._:@+-]{0,150}")
 _BOOKKEEPING: Final = (".coach_checkpoint", "checkpoint", "deepracer_checkpoints.json", ".ready", ".lock", ".finished")
 _WEIGHTS: Final = re.compile(r".*\.(ckpt\..*|ckpt|index|meta|data-\d+-of-\d+|pb|pbtxt|h5|tflite|onnx|pt|pth)")
+_COPY: Final = re.compile(r"(\.txt|[ _-]*(\(\d+\)|copy|kopie|\d+))+$")
+"""What a download, a copy or an editor of Windows puts behind a file's name."""
+_MEANT: Final = {
+    **dict.fromkeys(("rewardfunction.py", "rewardfunctions.py", "reward.py"), REWARD),
+    "modelmetadata.json": METADATA,
+    **dict.fromkeys(("hyperparameters.json", "hyperparameter.json", "hyperparams.json"), HYPERPARAMETERS),
+}
 _FOLDERS_OF_OTHERS: Final = ("defaults", "data", EXPERIMENTS)  # of deepracer-for-cloud, beside the model's own files
 
 
@@ -72,6 +79,25 @@ def role(name: str) -> Role:
         return "code"
     is_packed_file = base.endswith((".csv.gz", ".log.gz", ".json.gz"))  # which are no archives
     return "archive" if is_archive_name(base) and not is_packed_file else "other"
+
+
+def meant_by(name: str) -> str:
+    """What a file would be read as if it were called so, or an empty string: ``Reward_Function (1).py`` as a reward."""
+    base = name.rpartition("/")[2]
+    stem, dot, ending = _COPY.sub("", base.lower()).rpartition(".")
+    plain = re.sub("[ _-]", "", _COPY.sub("", stem))
+    meant = _MEANT.get(f"{plain}{dot}{ending}", "")
+    return "" if meant == base else meant
+
+
+def hint_at(files: Iterable[str], wanted: Iterable[str]) -> str:
+    """What to do where none of the wanted files is there, but perhaps one that should be called so, or an archive."""
+    files = sorted(files, key=lambda name: (name.count("/"), name))
+    for name in files:
+        if meant_by(name) in wanted:
+            return f"Is {ascii(name)[:100]} meant? Call it {meant_by(name)}."
+    packed = next((name for name in files if role(name) == "archive"), "")
+    return f"It holds an archive, {ascii(packed)[:100]}: unpack it and import that." if packed else ""
 
 
 def is_plain(name: str) -> bool:
@@ -120,7 +146,8 @@ def find_root(names: Iterable[str], *, source: str) -> str:
             return ""
         raise SourceError(
             f"{source} holds nothing that is understood: neither {REWARD} nor {METADATA} nor {RUN_ENV}.",
-            hint="Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
+            hint=hint_at(names, (REWARD, METADATA))
+            or "Name a deepracer-for-cloud folder, a model's folder or archive, or a reward function's file.",
         )
     runs = runs_inside(names, "")
     originals = {root for root in roots if not is_below(root, runs)}

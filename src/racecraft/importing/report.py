@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from racecraft.errors import printable, typed
-from racecraft.importing.layout import Role, role
+from racecraft.importing.layout import Role, meant_by, role
 from racecraft.importing.source import SourceFile
 
 _WHY: dict[Role, str] = {
@@ -18,6 +18,7 @@ _WHY: dict[Role, str] = {
     "archive": "archives inside are not opened; import one by itself",
     "other": "nothing that is read",
 }
+_WHY_MISNAMED = "the original's file has another name: give it that if it is to be read"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +72,12 @@ def _plain(told: dict[str, str]) -> dict[str, str]:
 def unused_files(files: Iterable[SourceFile], root: str) -> dict[str, str]:
     """Files that are not taken over for what they are: a line for each kind, with the number and size."""
     found: dict[Role, list[SourceFile]] = {}
-    for file in files:
-        found.setdefault(role(file.name), []).append(file)
     lines = {}
+    for file in files:
+        if meant_by(file.name):
+            lines[f"{file.name.removeprefix(root)} ({_size(file.size)})"] = _WHY_MISNAMED
+        else:
+            found.setdefault(role(file.name), []).append(file)
     for kind, why in _WHY.items():
         if kind in found:
             names = sorted(file.name.removeprefix(root) for file in found[kind])
