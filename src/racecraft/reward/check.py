@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final, Literal
 
-from racecraft.checks import check_type
 from racecraft.errors import RewardError, did_you_mean, printable
 from racecraft.reward.imports import ImportRules
 from racecraft.reward.keys import missing_keys
@@ -66,7 +65,10 @@ def check_reward(source: str) -> list[Problem]:
     Raises:
         ConfigError: The source is no text.
     """
-    check_type("source", source, str, "use the text of a reward function, which load_reward(path) reads")
+    if not isinstance(source, str):
+        from racecraft.checks import check_type  # knows NumPy, which the process that reads a stranger's source does not
+
+        check_type("source", source, str, "use the text of a reward function, which load_reward(path) reads")
     try:
         with scoped_warnings("ignore"):  # Python's own are caught where the source is parsed
             problems = list(islice(_problems(source), MAX_PROBLEMS))
