@@ -195,6 +195,8 @@ def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     ("command", "variables", "status", "says"),
     [
         ("tracks", {"PYTHONIOENCODING": "ascii"}, 0, ""),
+        ("tracks", {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, 0, ""),
+        ("reward check racing <&- >&- 2>&-", {}, 0, ""),
         ("doctor", {"RACECRAFT_ISA": "sse9"}, 1, "ConfigError: Instruction set 'sse9' cannot run here; choose one of "),
         ("tracks --json > /dev/full", {}, 1, "OSError: [Errno 28] No space left on device"),
         ("tracks > /dev/full", {}, 1, "OSError: [Errno 28] No space left on device"),

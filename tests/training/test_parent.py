@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,16 @@ def test_a_child_begins_with_the_weights_and_settings_of_its_parent(tiny: Train,
     assert copied.keys() == given.keys()
     for name, array in given.items():
         np.testing.assert_array_equal(copied[name], array, err_msg=name)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text elsewhere")
+def test_a_child_of_a_run_whose_folder_is_no_text_can_be_opened(tiny: Train, parent: Path, tmp_path: Path) -> None:
+    odd = tmp_path / os.fsdecode(b"odd\xff")
+    shutil.copytree(parent, odd)
+    child = make_plan(parent=odd, until="64 steps").start(root=tmp_path, name="child")
+    said = RunFolder.open(child.path).read_info().parent
+    assert said is not None
+    assert said["run"] == f"{tmp_path}/odd\ufffd"
 
 
 def test_it_learns_on_from_them_and_not_from_random_ones(tiny: Train, parent: Path) -> None:

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,8 @@ from racecraft.learn import DistillConfig, PPOConfig, SACConfig
 from racecraft.reward import load_preset, load_reward
 from racecraft.run import RunFolder
 from racecraft.sim import Bots, Objects, Obstacles, Start, Vehicle
+from racecraft.track import load_track
+from racecraft.track.readers import save_route
 from racecraft.training import Until, train
 from racecraft.training import settings as settings_module
 from racecraft.training.opponents import Opponents
@@ -285,6 +289,14 @@ def test_arguments_of_another_kind_are_refused(tmp_path: Path, given: dict[str, 
     with pytest.raises(ConfigError) as refusal:
         train("oval", **{"root": tmp_path / "runs", **given})
     assert str(refusal.value) == says
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are text elsewhere")
+def test_a_track_whose_name_no_run_could_keep_leaves_no_run(tmp_path: Path) -> None:
+    save_route(load_track("oval"), file := tmp_path / os.fsdecode(b"r\xff.npy"))
+    with pytest.raises(ConfigError, match=r"track is '.*r\\udcff\.npy'; a run keeps that as text"):
+        train(file, root=tmp_path / "runs", until="1 steps")
     assert not (tmp_path / "runs").exists()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gc
 import importlib
 import os
@@ -95,11 +96,12 @@ def main() -> None:
     interrupted. With ``--json`` an error is a JSON object on stdout, too. ``--debug`` shows the stack trace.
     """
     gc.set_threshold(*GARBAGE)
+    _hold_standard_files()
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # or every package installed is asked for one
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     is_debug, is_json = len(arguments) < len(sys.argv) - 1, "--json" in arguments
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":  # who lacks a sign sees another for it
+        if isinstance(stream, TextIOWrapper) and _can_fail(stream):  # who lacks a sign sees another for it
             stream.reconfigure(errors="replace")
     warnings.showwarning = lambda message, *_, **__: typer.echo(f"warning: {printable_lines(str(message))}", err=True)
     try:
@@ -127,6 +129,24 @@ def main() -> None:
             text().say_error(code, message, hint)
         sys.exit(1)
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _hold_standard_files() -> None:
+    """Put nothing where one of the three was closed: a file of ours would take its number, and what others write to it.
+
+    Whoever starts a program with ``<&-`` does so; a process that we start could have a pipe of ours for its stderr.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+
+
+def _can_fail(stream: TextIOWrapper) -> bool:
+    """Whether a sign may be one that a stream cannot write; in UTF-8 even half a name can be, byte for byte."""
+    is_utf8 = codecs.lookup(stream.encoding).name == "utf-8"
+    return stream.errors == "strict" or (stream.errors == "surrogateescape" and not is_utf8)
 
 
 def _known(error: Exception) -> ConfigError | None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent import ModelMetadata
-from racecraft.errors import CheckpointError, ConfigError
+from racecraft.errors import CheckpointError, ConfigError, printable
 from racecraft.learn import Learner, NetworkSpec
 from racecraft.learn.learner import below
 from racecraft.learn.networks import weight_shapes
@@ -54,7 +54,7 @@ class Parent:
 
     def record(self) -> dict[str, Any]:
         """For run.json."""
-        return {"run": str(self.folder.path), "step": self.saved.step, "file": self.saved.path.name}
+        return {"run": printable(str(self.folder.path)), "step": self.saved.step, "file": self.saved.path.name}
 
     def check(self, spec: NetworkSpec, metadata: ModelMetadata) -> list[str]:
         """Refuse a network that the weights do not fit.

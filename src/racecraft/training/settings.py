@@ -288,6 +288,9 @@ def make_settings(
     if not isinstance(randomize, Randomization):
         randomize = load_randomization(randomize)
     roads, until = load_tracks(track), settings.get("until")
+    kept = join_names(track)
+    if kept.encode(errors="ignore").decode() != kept:
+        raise ConfigError(f"track is {kept!r}; a run keeps that as text, which the name of the file has to be.")
     circumstances: dict[str, Any] = {
         "objects": settings.get("objects", NO_OBJECTS),
         "opponents": settings.get("opponents"),
@@ -340,7 +343,7 @@ def make_settings(
     if hyperparameters is None and num_envs:
         ppo = _with_num_envs(ppo, num_envs, most=regime.most_envs)
     return TrainSettings(
-        track=join_names(track),
+        track=kept,
         randomize=randomize,
         vehicle=vehicle,
         network=network,
