@@ -33,8 +33,8 @@ COMMANDS: dict[str, list[str]] = {
     "train": [
         f"train {AHEAD} -n a -r racing --actions continuous --network RACECRAFT_SMALL --critic camera --vehicle v4"
         " --camera 2026 --direction reverse --randomize light -s 2 --json --video --aws-log L",
-        f"train {SHORT} -n b --model-metadata M --hyperparameters H --device cpu --sensors STEREO_CAMERAS",
-        f"train {SHORT} -n c --race object-avoidance {BOXES}",
+        f"train {SHORT} -n b --model-metadata M --hyperparameters H --device cpu",
+        f"train {SHORT} -n c --sensors STEREO_CAMERAS --race object-avoidance {BOXES}",
         f"train {SHORT} -n l --race head-to-bot {BOTS}",
         f"train {SHORT} -n d --race object-avoidance --objects 1 --positions 0.5,1",
         f"train {SHORT} -n e --race head-to-head --cars 2 --opponents self",
