@@ -109,6 +109,32 @@ def test_two_tabs_train_at_once_and_one_that_slept_goes_on(tabs: list[Page]) -> 
         assert models(page) == ["oval-centerline-1", "oval-centerline-2"]
 
 
+def test_a_page_that_is_left_while_cars_learn_asks_first_and_tells_then_what_is_kept(tabs: list[Page]) -> None:
+    from playwright.sync_api import expect
+
+    page, asked = tabs[0].context.browser.new_context().new_page(), []
+    page.set_default_timeout(PATIENCE)
+    page.on("dialog", lambda dialog: (asked.append(dialog.type), dialog.accept()))
+    page.goto(tabs[0].url)
+    page.get_by_role("combobox", name="Track").select_option("generated:3")
+    page.get_by_role("button", name="Train", exact=True).click()
+    page.locator(".model").wait_for()
+    page.reload()
+    assert asked == ["beforeunload"]
+    told = page.get_by_role("region", name="A training was cut short")
+    told.get_by_text("is kept as generated-3-racing-1.").wait_for()
+    told.get_by_role("button", name="Train on").press("Enter")
+    expect(told).to_have_count(0)
+    expect(page.get_by_role("button", name="Train", exact=True)).to_be_focused()
+    page.get_by_text("Begins with what generated-3-racing-1 has learned.").wait_for()
+    assert page.get_by_role("combobox", name="Track").input_value() == "generated:3"
+    page.reload()
+    page.get_by_text("generated-3-racing-1", exact=True).wait_for()
+    assert asked == ["beforeunload"]  # nobody learns
+    expect(told).to_have_count(0)
+    page.context.close()
+
+
 def test_a_model_is_given_another_name_that_no_other_one_has(tabs: list[Page]) -> None:
     page, other = tabs
     for name, shown in (

@@ -108,6 +108,12 @@ export const de: Record<TabKey, string> = {
   gift_broken: "Dieser Link bringt keine Belohnung mit: Er ist beschädigt oder unterwegs abgeschnitten worden.",
   gift_take: "Übernehmen",
   gift_leave: "Lassen",
+  cut_short: "Ein Training wurde unterbrochen",
+  cut_short_lead: "Die Seite wurde geschlossen oder neu geladen, während Autos lernten: {track}.",
+  cut_short_kept: "Was sie nach {time} konnten, wurde gewertet und ist als {name} aufbewahrt.",
+  cut_short_lost:
+    "Noch war nichts davon gewertet, oder dieser Browser hatte keinen Platz dafür; es ist nichts aufbewahrt.",
+  cut_short_again: "Wieder so einstellen",
   printed: "Was sie ausgegeben hat",
   situation_start: "Start",
   situation_straight: "Gerade",

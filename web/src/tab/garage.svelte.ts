@@ -12,6 +12,11 @@ export class Garage {
   /** `onUnkept`: is told why a model could not be kept. */
   constructor(private readonly onUnkept: (error: unknown) => void) {}
 
+  /** Whether some of them are gone with the page. */
+  get hasUnkept(): boolean {
+    return this.unkept.length > 0;
+  }
+
   /** Look at what is there; other tabs keep and delete, too. */
   async list(): Promise<void> {
     this.stored = await kept();
