@@ -25,6 +25,7 @@ from racecraft.tuning import (
     find_constants,
     record,
     seats,
+    start,
     start_tuning,
     study,
 )
@@ -318,6 +319,17 @@ def test_a_study_lies_in_its_search_whatever_the_folder_is_called(tmp_path: Path
     Tuning(begin(root)).past()
     assert (root / "search" / "study.sqlite").is_file()
     assert [path.name for path in tmp_path.iterdir()] == [root.name]
+
+
+def test_a_full_disk_at_the_beginning_leaves_the_name_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_space(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as full:
+        full.setattr(start, "write_json", no_space)
+        with pytest.raises(RunError, match="search cannot be made: No space left"):
+            begin(tmp_path)
+    assert begin(tmp_path).is_dir()
 
 
 def test_names_limits_and_damage_are_told_in_a_sentence(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -117,6 +118,11 @@ def make_tuning(
     folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
     try:
         folder.mkdir(parents=True)
+    except FileExistsError as error:
+        raise RunError(f"{folder} exists.", hint="Choose another --name, or continue it with --resume.") from error
+    except OSError as error:
+        raise RunError(f"{folder} cannot be made: {error.strerror or error}.") from error
+    try:
         write_file(folder / "reward_function.py", plan.reward.encode())
         write_json(folder / "model_metadata.json", plan.metadata.to_dict())
         write_json(
@@ -133,10 +139,11 @@ def make_tuning(
                 "notes": list(plan.notes),
             },
         )
-    except FileExistsError as error:
-        raise RunError(f"{folder} exists.", hint="Choose another --name, or continue it with --resume.") from error
-    except OSError as error:
-        raise RunError(f"{folder} cannot be made: {error.strerror or error}.") from error
+    except BaseException as error:
+        shutil.rmtree(folder, ignore_errors=True)  # half of one can neither be continued nor made again
+        if isinstance(error, OSError):
+            raise RunError(f"{folder} cannot be made: {error.strerror or error}.") from error
+        raise
     return folder
 
 
