@@ -34,9 +34,12 @@ const send = (lesson: number, step: Step) => ask<LessonProgress>("PUT", `/lesson
 /** Whose steps are kept: of a console that is no league's there is one person. */
 const person = () => who.me?.id ?? 0;
 
+/** What was read and answered without a console, by whoever is here now. */
+export const sendKept = (): Promise<void> => sendAll(person(), send);
+
 export const consoleDesk: Desk = {
   list: async () => {
-    await sendAll(person(), send);
+    await sendKept();
     return ask<LessonCard[]>("GET", "/lessons");
   },
   lesson: (number) => ask<LessonPage>("GET", `/lessons/${number}`),
@@ -47,7 +50,7 @@ export const consoleDesk: Desk = {
       if (!(error instanceof Problem && error.code === "Offline")) throw error;
       if (unsentOf(person()).length === 0) say(c("kept_unsent")); // once is enough
       keep({ person: person(), lesson: lesson.number, step });
-      await sendAll(person(), send);
+      await sendKept();
       return await send(lesson.number, {}); // nothing more: what there is now
     }
   },
