@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from racecraft import evaluate, generalize
+from racecraft import evaluate, generalize, load_tracks
 from racecraft.errors import RunError
 from racecraft.learn.learner import below
-from racecraft.race.policy import load_policy
+from racecraft.race.policy import load_driver, load_policy
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
 from racecraft.run.checkpoint import header_of
@@ -27,6 +28,7 @@ from racecraft.training.taught import TEACHERS, taught
 
 UNSEEN = "generated:500..503,radius=0.6"
 MOST_BYTES = 2 << 20
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture
@@ -49,6 +51,20 @@ def test_a_starter_is_a_small_run_that_drives_where_it_never_was(name: str, here
     assert found.generalization.laps >= 7
     assert files(FOLDER / name) == shipped  # what is driven is written beside the run's copy
     assert open_parent(f"starter:{name}").weights.keys() >= {"policy.head.weight", "policy.head.bias"}
+
+
+@pytest.mark.costly
+@pytest.mark.parametrize("name", ["steady", "quick"])
+def test_a_starter_gets_nowhere_without_what_it_sees(name: str, here: Path) -> None:
+    controls = runpy.run_path(str(BENCHMARKS / "controls.py"))
+    policy, options = load_driver(f"starter:{name}"), Namespace(num_threads=1)
+    found = {
+        told: controls["alone"](driver, policy, load_tracks("generated:500,radius=0.6"), options)
+        for told, driver in controls["drivers"](policy)
+        if told != "as it is"
+    }
+    assert found.keys() == {"blind", "shuffled"}
+    assert max(row["completion"] for row in found.values()) < 0.5, found
 
 
 @pytest.mark.parametrize("name", starter_names())
@@ -90,7 +106,7 @@ def test_who_goes_on_with_the_quick_one_is_to_be_fast_on_that_road(track: str | 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf, 65_520.0])
 def test_what_no_half_can_say_is_not_written(value: float) -> None:
-    halves = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "starters.py"))["halves"]
+    halves = runpy.run_path(str(BENCHMARKS / "starters.py"))["halves"]
     assert halves("policy", np.float32([65_519.0, 1 / 3])).tolist() == [65_504.0, 0.333251953125]
     with pytest.raises(ValueError, match=r"policy has weights that are no finite numbers of 16 bits"):
         halves("policy", np.float32([0.0, value]))
