@@ -14,7 +14,7 @@ import pytest
 from racecraft.agent import ModelMetadata, action_space
 from racecraft.analysis import pay_laps, write_report
 from racecraft.analysis.svg import Chart, Curve, line_chart, nice_ticks
-from racecraft.errors import RewardError, RunError
+from racecraft.errors import ConfigError, RewardError, RunError
 from racecraft.judging.evaluation import evaluate_run
 from racecraft.reward import load_preset
 from racecraft.run import RunFolder
@@ -158,6 +158,8 @@ def test_what_cannot_be_reported_is_told(run: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match="cannot be written"):
         write_report(run, tmp_path / "file" / "r.html")
+    with pytest.raises(ConfigError, match="path is 5; use a file's path"):
+        write_report(run, 5)  # type: ignore[arg-type]
 
 
 def test_laps_are_paid_anew(run: Path) -> None:

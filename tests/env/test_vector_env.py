@@ -131,6 +131,8 @@ def test_disabled_refuses_to_step_a_finished_car():
         envs.step(np.array([5, 5]))
     with pytest.raises(ResetNeeded, match=r"\[0, 1\]"):
         envs.step(np.array([5, 5]))
+    with pytest.raises(ConfigError, match=r"options is 5; use a dict, such as \{'reset_mask': mask\}"):
+        envs.reset(options=5)
     envs.reset(options={"reset_mask": np.array([True, False])})
     with pytest.raises(ResetNeeded, match=r"\[1\]"):
         envs.step(np.array([5, 5]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from workers import function, running
 
-from racecraft.errors import RewardError
+from racecraft.errors import ConfigError, RewardError
 from racecraft.reward.worker import RewardWorker
 
 
@@ -45,6 +45,27 @@ def test_a_source_that_hangs_while_it_loads(track):
     with pytest.raises(RewardError, match=r"within 0\.3 s") as caught:
         RewardWorker("x = 1\nwhile True: pass", track, start_timeout_s=0.3)
     assert caught.value.line == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"source": None}, "source is None; use the text of a reward function"),
+        ({"source": b"x = 1"}, "source is b'x = 1'; use the text of a reward function"),
+        ({"tracks": None}, "tracks is None; allowed is a Track, or several in a list"),
+        ({"tracks": []}, r"tracks is \[\]; allowed is a Track"),
+        ({"tracks": "oval"}, "tracks is 'oval'; allowed is a Track"),
+        ({"timeout_s": None}, "timeout_s is None; allowed is a number above 0"),
+        ({"start_timeout_s": float("inf")}, "start_timeout_s is inf; allowed is a number above 0, to 1000000"),
+        ({"seed": None}, "seed is None; allowed is a whole number"),
+        ({"num_cars": 10**30}, "num_cars is 10+; allowed is a whole number from 1 to 1048576"),
+        ({"num_objects": 1.5}, "num_objects is 1.5; allowed is a whole number"),
+        ({"memory_limit_mb": "2048"}, "memory_limit_mb is '2048'; allowed is a whole number from 64"),
+    ],
+)
+def test_what_no_worker_can_be_made_of_is_told_before_there_is_one(track, given, says):
+    with pytest.raises(ConfigError, match=says):
+        RewardWorker(**{"source": "x = 1", "tracks": track, **given})
 
 
 def test_a_worker_that_nobody_waits_for_comes_up_by_itself(track, rows):

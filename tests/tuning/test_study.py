@@ -344,6 +344,9 @@ def test_names_limits_and_damage_are_told_in_a_sentence(tmp_path: Path) -> None:
         Tuning(folder).run(max_trials=-1)
     with pytest.raises(RunError, match="holds no tuning"):
         Tuning(tmp_path)
+    for wrong in (None, 5, "a\0b"):
+        with pytest.raises(ConfigError, match=r"tuning is .*; use the path of a search's folder"):
+            Tuning(wrong)  # type: ignore[arg-type]
     (folder / "study.sqlite").write_bytes(b"not a database")
     with pytest.raises(RunError, match=r"study\.sqlite cannot be used"):
         Tuning(folder).run(minutes=1)

@@ -21,7 +21,7 @@ from racecraft.analysis.learned import bands, checkpoint_table, rewards, stretch
 from racecraft.analysis.maps import LARGEST, draw_maps, iterations_of
 from racecraft.analysis.report_page import page, pairs, section, table
 from racecraft.analysis.svg import Chart, Curve, action_fan, cell_map, line_chart, racing_line
-from racecraft.checks import is_number
+from racecraft.checks import check_path, is_number
 from racecraft.errors import RacecraftError, RunError, TrackError, TrackNotFound
 from racecraft.json_file import read_json_object
 from racecraft.judging.trained import is_road_of, trained_title
@@ -45,6 +45,8 @@ def write_report(run: str | Path, path: str | Path | None = None) -> Path:
     Raises:
         RunError: The run cannot be read, or the file cannot be written.
     """
+    if path is not None:
+        check_path("path", path, "use a file's path")
     folder = RunFolder.open(run)
     target = Path(path) if path is not None else folder.path / "report.html"
     text = report(folder)

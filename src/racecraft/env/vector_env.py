@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from racecraft.checks import check_flag
+from racecraft.checks import check_flag, check_type
 from racecraft.env.info import vector_info
 from racecraft.env.observation import Observation
 from racecraft.env.rendering import Renderer, check_render_mode
@@ -181,6 +181,7 @@ class RacecraftVectorEnv(VectorEnv[Observation, Any, NDArray[Any]]):
         }
 
     def _reset_mask(self, options: dict[str, Any] | None) -> NDArray[np.bool_]:
+        check_type("options", options, (dict, type(None)), "use a dict, such as {'reset_mask': mask}")
         if not options or "reset_mask" not in options:
             return np.ones(self.num_envs, dtype=np.bool_)
         mask = options["reset_mask"]

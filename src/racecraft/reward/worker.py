@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from racecraft import system
-from racecraft.checks import require
+from racecraft.checks import check_type, check_whole, is_number, require
 from racecraft.errors import ConfigError, RewardError, RewardTimeout, ShapeError, printable
 from racecraft.reward import launch
 from racecraft.reward import worker_process as protocol
@@ -46,6 +46,7 @@ Rows = npt.NDArray[np.float64]
 
 TEXT_BYTES = 8 * 1024  # longest description of a failure
 PATIENCE, MOST_PATIENCE = 10.0, 30.0  # times its limit, or s beyond it: how long a call may last by the wall
+MOST_SECONDS = 1_000_000  # s, that a limit may be: more than a week
 LEAST_WAIT = 0.01  # s, between two looks at a core's time
 LOG_BYTES = 64 * 1024  # how much of the last printed text is kept
 MAX_BATCH = 4096  # rows per doorbell; larger arrays go over in parts
@@ -107,9 +108,17 @@ class RewardWorker:
         confinement: Confinement | None = None,
         waits: bool = True,
     ) -> None:
-        for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s), ("num_cars", num_cars)):
-            require(name, value, value > 0, "a number above 0")
-        require("memory_limit_mb", memory_limit_mb, memory_limit_mb >= 64, "64 or more, which a process needs")
+        check_type("source", source, str, "use the text of a reward function, which load_reward(path) reads")
+        several = tuple(tracks) if isinstance(tracks, Sequence) else (tracks,)
+        are_tracks = len(several) > 0 and all(hasattr(track, "waypoints") for track in several)
+        require("tracks", tracks, are_tracks, "a Track, or several in a list")
+        for name, value in (("timeout_s", timeout_s), ("start_timeout_s", start_timeout_s)):
+            is_time = is_number(value, is_plain=False) and 0 < value <= MOST_SECONDS
+            require(name, value, is_time, f"a number above 0, to {MOST_SECONDS}")
+        require("seed", seed, isinstance(seed, int | np.integer), "a whole number")
+        check_whole("num_cars", num_cars, 1, 2**20)
+        check_whole("num_objects", num_objects, 0, 1000)
+        check_whole("memory_limit_mb", memory_limit_mb, 64, 2**20)
         confinement = find_confinement() if confinement is None else confinement
         if foreign:
             confinement.require()
@@ -118,8 +127,8 @@ class RewardWorker:
         self.confinement = confinement
         """The walls around the process."""
         self._source = source
-        self._waypoints = waypoints_of(tracks if isinstance(tracks, Sequence) else (tracks,))
-        self._timeout_s = timeout_s
+        self._waypoints = waypoints_of(several)
+        self._timeout_s = float(timeout_s)
         self._failure = ""  # why the process has ended: text, as a kept error would keep this object alive
         self._num_read = 0  # bytes of the log
         self.num_lost = 0
@@ -166,7 +175,7 @@ class RewardWorker:
 
         setup = {
             "source": source,
-            "seed": seed % 2**32,
+            "seed": int(seed) % 2**32,
             "waypoints": self._waypoints,
             "num_columns": width,
             "num_cars": num_cars,
@@ -186,7 +195,7 @@ class RewardWorker:
             "kernel_path": str(launch.PROGRAM.with_name("kernel.py")),
             "trace_signal": system.TRACE,
         }
-        self._start_timeout_s = start_timeout_s
+        self._start_timeout_s = float(start_timeout_s)
         self._turn = threading.Lock()  # of several threads that ask, one after the other has the memory and the pipes
         self._is_ready = False
         try:

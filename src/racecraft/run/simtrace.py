@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from racecraft.agent import ActionSpace, DiscreteActionSpace
+from racecraft.checks import check_path
 from racecraft.errors import CheckpointError, RunError
 from racecraft.run.episodes import Episode
 from racecraft.sim import CONTROL_DT
@@ -367,6 +368,7 @@ def read_simtrace(path: str | Path, *, max_rows: int = MAX_READ_ROWS) -> dict[st
     Raises:
         RunError: Not readable, not a sim-trace, or too long; names the line.
     """
+    check_path("path", path, "use a file's path")
     path = Path(path)
     rows: list[list[str]] = []
     names: list[str] | None = None

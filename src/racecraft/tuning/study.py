@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from racecraft.agent import ModelMetadata
-from racecraft.checks import check_number, check_whole, require
+from racecraft.checks import check_number, check_path, check_whole, require
 from racecraft.errors import CheckpointError, ConfigError, RacecraftError, RunError
 from racecraft.extras import check_installed
 from racecraft.json_file import read_json_object
@@ -72,6 +72,7 @@ class Tuning:
         foreign: bool = False,
         parents: Path | None = None,
     ) -> None:
+        check_path("tuning", folder, "use the path of a search's folder, such as 'tuning/NAME'")
         self.folder = Path(folder)
         if not os.path.isfile(self.folder / "tuning.json"):  # False of names too long for one, too
             raise RunError(f"{str(self.folder)[:200]} holds no tuning: tuning.json is missing.")
