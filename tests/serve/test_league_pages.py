@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -166,6 +167,14 @@ def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Les
     pupil.locator(f"button[aria-label='Film: {'Turbo' if last == 'Comet' else 'Comet'}']").click()
     pupil.locator("#film").get_by_label("Live").wait_for()
     assert sorted(pupil.locator("#film li button span:first-of-type").all_inner_texts()) == ["Comet", "Turbo"]
+
+    group = ok(lesson.league.owner.get("/api/groups"))[0]["id"]
+    racer = f"/api/groups/{group}/members/{lesson.league.number(pupil_client(lesson, last))}"
+    ok(lesson.league.owner.patch(racer, json={"name": 32 * "W"}), 204)
+    wall = lesson.visits["teacher"].open(f"/league/{race}/screen", width=390)
+    wall.get_by_role("heading", name=re.compile("^Time behind")).wait_for()
+    assert lesson.visits["teacher"].overflow() == 0, "the longest name fits a phone"
+    ok(lesson.league.owner.patch(racer, json={"name": last}), 204)
 
 
 def test_the_best_meet_in_a_final_and_the_wall_shows_it_heat_by_heat(lesson: Lesson, race: int) -> None:
