@@ -217,7 +217,7 @@ export const de: Record<LeagueKey, string> = {
     "Die Plätze gehen reihum: Wer noch nie dran war, kommt als Nächstes, und was ruht, geht weiter, wo es war.",
   season: "Saison",
   season_lead: "Punkte aus jedem Rennen, das vorbei ist, und wie nah alle dem Ersten kamen.",
-  season_none: "Noch ist kein Rennen dieser Saison vorbei.",
+  season_none: "Noch hat kein Rennen dieser Saison Plätze vergeben.",
   season_all: "Rennen für Rennen",
   pace: "Tempo",
   pace_lead:

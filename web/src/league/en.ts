@@ -208,7 +208,7 @@ export const en = {
   quota_mine_lead: "Places go round: who waits for a first turn comes next, and what rests goes on where it was.",
   season: "Season",
   season_lead: "Points from every race that is over, and how close everybody came to the first.",
-  season_none: "No race of this season is over yet.",
+  season_none: "No race of this season has given places yet.",
   season_all: "Race by race",
   pace: "Pace",
   pace_lead:
