@@ -61,6 +61,11 @@ def test_what_is_no_list_of_models_is_told(models: Any) -> None:
 def test_what_is_no_setting_of_a_race_is_told_before_it_is_driven(settings: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         race_models(["a", "b"], track="oval", **settings)
+    if "changes" in settings:
+        with pytest.raises(ConfigError, match=says):
+            rate_models(["a", "b"], tracks="oval", **settings)
+        with pytest.raises(ConfigError, match="progress is None; allowed is a function that takes a text"):
+            rate_models(["a", "b"], tracks="oval", progress=None)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

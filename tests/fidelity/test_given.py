@@ -41,6 +41,7 @@ REWARD = r"reward is .*; allowed is its source, which racecraft\.reward\.load_re
         ({"track": None}, "track is None; use a name or a file's path"),
         ({"vehicle": None}, "vehicle is None; use v4, v5, v6, a file's path or a Vehicle"),
         ({"rows": 5}, "rows is 5; use a CSV file's path"),
+        ({"rows": "\0"}, "rows is .*; use a CSV file's path"),
         ({"reward": "racing"}, REWARD),
         ({"reward": "mine/reward_function.py"}, REWARD),
         ({"reward": Path("reward_function.py")}, REWARD),

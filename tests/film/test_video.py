@@ -56,8 +56,12 @@ def test_what_is_no_recording_and_no_path_is_told():
         film(5, "car.mp4")
     with pytest.raises(ConfigError, match="path is 5; use a file's path"):
         film(None, 5)
+    with pytest.raises(ConfigError, match="name is 5; use a text"):
+        film(None, "car.mp4", name=5)
     with pytest.raises(ConfigError, match="recording is 5; use a trial's recording"):
         draw_racing_line(5, "line.png")
+    with pytest.raises(ConfigError, match="title is 5; use a text"):
+        draw_racing_line(CLUMSY, "line.png", title=5)
 
 
 def test_an_empty_recording():

@@ -306,6 +306,8 @@ def test_what_does_not_train_now_is_an_error_and_no_search(tmp_path: Path) -> No
     [
         ({"goal": "fame"}, "goal is 'fame'; allowed are laps, lap_time"),
         ({"trial_steps": 0}, "trial_steps is 0"),
+        ({"root": "a\0b"}, "root is .*; use a folder's path"),
+        ({"name": 5}, "name is 5; use a text"),
         ({"search": ["nonsense"]}, "neither a constant"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterable
 from contextlib import ExitStack
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_type, require
+from racecraft.checks import check_path, require
 from racecraft.fidelity.differences import Differences
 from racecraft.fidelity.dynamics import (
     KNOWN_ROWS,
@@ -124,7 +123,7 @@ def replay(
         RewardError: The reward function is not valid or fails.
     """
     if rows is not None:
-        check_type("rows", rows, (str, os.PathLike), "use a CSV file's path")
+        check_path("rows", rows, "use a CSV file's path")
     paths, road, car = log_files(logs), track_of(track), vehicle_of(vehicle)
     if reward is not None:
         from racecraft.reward import preset_names, validate_reward

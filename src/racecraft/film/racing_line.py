@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from racecraft.checks import check_type
+from racecraft.checks import check_path, check_type
 from racecraft.errors import ConfigError
 from racecraft.race.recording import Recording
 from racecraft.race.rules import RESET_STATUSES
@@ -65,7 +64,8 @@ def draw_racing_line(
         TrackError: The width or the file's ending is not allowed.
     """
     check_type("recording", recording, Recording, "use a trial's recording, or one lap of it")
-    check_type("path", path, (str, PathLike), "use a file's path")
+    check_path("path", path, "use a file's path")
+    check_type("title", title, str, "use a text")
     if len(recording) < 2:
         raise ConfigError(f"A racing line needs at least two steps, this recording has {len(recording)}.")
     speeds = recording.column("actual_speed")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import Final
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from racecraft.agent.sensor_suite import FRONT_CAMERA, SensorSuite
-from racecraft.checks import check_type
+from racecraft.checks import check_path, check_type
 from racecraft.errors import ConfigError
 from racecraft.film.encoding import FRAME_RATE, write_video
 from racecraft.film.ghost import LIVERY, Ghost, Rival
@@ -67,7 +66,8 @@ def film(
         ConfigError: Nothing was recorded, or the path does not end in .mp4.
         RunError: The file cannot be written.
     """
-    check_type("path", path, (str, PathLike), "use a file's path")
+    check_path("path", path, "use a file's path")
+    check_type("name", name, str, "use a text")
     path = Path(path)
     if path.suffix.lower() != ".mp4":
         raise ConfigError(f"Cannot write a video to {path.name!r}; the name must end in .mp4.")

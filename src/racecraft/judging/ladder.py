@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from racecraft.checks import check_whole
+from racecraft.checks import check_whole, require
 from racecraft.contest.ladder import Ladder, Match, check_ladder, hold_ladder
 from racecraft.race.conditions import STANDARD_CAR, Conditions
 from racecraft.race.entry import check_models, load_entries
@@ -62,6 +62,8 @@ def rate_models(
     """
     check_models(models)
     check_whole("seed", seed, 0, 2**64 - 1)
+    require("progress", progress, callable(progress), "a function that takes a text")
+    require("changes", changes, changes is None or isinstance(changes, dict), "a dict of rules by name")
     check_ladder(len(models), kind=kind, schedule=schedule, starts=starts, rounds=rounds)
     entries = load_entries(models, num_threads=num_threads)
     given = {name: value for name, value in (changes or {}).items() if value is not None}

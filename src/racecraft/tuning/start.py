@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from racecraft.checks import check_choice, check_whole
+from racecraft.checks import check_choice, check_path, check_type, check_whole
 from racecraft.errors import ConfigError, RunError
 from racecraft.extras import check_installed
 from racecraft.run import RunFolder
@@ -115,6 +115,7 @@ def make_tuning(
     check_whole("trial_steps", trial_steps, 1, is_plain=True)
     check_whole("window", window, 1, MAX_WINDOW, is_plain=True)
     space = space_of(plan, search)
+    check_path("root", root, "use a folder's path")
     folder = Path(root) / (_checked(name) if name is not None else f"tuning-{time.strftime('%Y%m%d-%H%M%S')}")
     try:
         folder.mkdir(parents=True)
@@ -148,6 +149,7 @@ def make_tuning(
 
 
 def _checked(name: str) -> str:
+    check_type("name", name, str, "use a text")
     if sanitize_name(name) != name:
         raise RunError(f"Name {name!r} is not allowed.", hint=f"Use '{sanitize_name(name)}'.")
     return name
