@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tarfile
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from runs_made import nothing_was_made
 
 from racecraft.errors import ArchiveError, RacecraftError, SourceError
-from racecraft.importing import import_run
+from racecraft.importing import import_run, importer
 
 
 def changed(name: str, text: str) -> dict[str, str]:
@@ -99,6 +100,19 @@ def test_the_hint_for_a_file_that_a_copy_or_an_editor_called_otherwise(name: str
         with pytest.raises(SourceError, match=r"has no reward_function\.py") as caught:
             import_run(models.as_folder({name: models.REWARD, "model_metadata.json": models.METADATA}, tmp_path / "n"))
         assert caught.value.hint == f"Is {name!r} meant? Call it {meant}."
+
+
+def test_a_file_that_goes_meanwhile_is_told_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = str(tmp_path / "m" / "checkpoints" / "1.safetensors")
+
+    def keep(*_: object) -> None:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), gone)
+
+    monkeypatch.setattr(importer, "keep_history", keep)
+    with pytest.raises(SourceError) as caught:
+        import_run(models.as_folder(models.MODEL, tmp_path / "m"))
+    assert str(caught.value) == f"{gone} went while it was imported."
+    assert nothing_was_made()
 
 
 def test_the_hint_for_an_archive_inside(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
-from racecraft.errors import RunError, SourceError, TrackNotFound, did_you_mean, printable
+from racecraft.errors import SourceError, TrackNotFound, did_you_mean, printable
 from racecraft.importing.drfc import DrfcSettings, read_drfc
 from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
@@ -43,7 +43,7 @@ from racecraft.importing.layout import (
 from racecraft.importing.model_files import BEST, LAST, NONE, ModelFiles, choose_model, find_models
 from racecraft.importing.own import OwnRun, read_own
 from racecraft.importing.policy_weights import has_critic
-from racecraft.importing.report import ImportedRun, unused_files
+from racecraft.importing.report import ImportedRun, failure, unused_files
 from racecraft.importing.source import Source, SourceFile, open_source
 from racecraft.importing.weights import open_model, or_other_weights, read_weights, save_weights
 from racecraft.json_file import parse_json_object
@@ -214,7 +214,7 @@ def import_run(
         except BaseException as error:
             shutil.rmtree(folder.path, ignore_errors=True)
             if isinstance(error, OSError):
-                raise RunError(f"{folder.path} cannot be written: {error.strerror or error}.") from error
+                raise failure(error, folder.path) from error
             raise
         return report
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from racecraft.errors import printable, typed
+from racecraft.errors import RacecraftError, RunError, SourceError, printable, typed
 from racecraft.importing.layout import Role, meant_by, role
 from racecraft.importing.source import SourceFile
 
@@ -89,3 +89,12 @@ def unused_files(files: Iterable[SourceFile], root: str) -> dict[str, str]:
 
 def _size(count: int) -> str:
     return f"{count / 1e6:,.1f} MB" if count >= 100_000 else f"{count:,} bytes"
+
+
+def failure(error: OSError, run: Path) -> RacecraftError:
+    """Why a run could not be written: for want of room or rights, or as a file of the model went meanwhile."""
+    if isinstance(error, FileNotFoundError) and error.filename and not Path(error.filename).is_relative_to(run):
+        return SourceError(
+            f"{error.filename} went while it was imported.", hint="Stop what changes that folder, such as its training."
+        )
+    return RunError(f"{run} cannot be written: {error.strerror or error}.")
