@@ -1,6 +1,7 @@
 /** The server's answers, typed by its own OpenAPI; every error is one `Problem`. */
 import { back, connection, found, lost } from "../lib/connection.svelte";
 import { learnErrors, said, t } from "../i18n/index.svelte";
+import { sentAt } from "../lib/servertime";
 import type { components } from "./schema";
 
 type Schemas = components["schemas"];
@@ -86,6 +87,7 @@ async function send<T>(method: string, path: string, body: BodyInit | null, kind
     throw new Problem("Offline", t("offline_refused"), "", null, null);
   }
   found();
+  sentAt(reply.headers.get("date"));
   if (reply.status === 204) return undefined as T;
   const document = await reply.json().catch(() => null);
   if (!reply.ok) {
