@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import models
 import pytest
 
-from racecraft.errors import ConfigError
+from racecraft.errors import ConfigError, SourceError
 from racecraft.importing import drfc as settings_of_drfc
 from racecraft.importing import import_run
 from racecraft.importing.env_file import parse_env
@@ -148,6 +149,31 @@ def test_settings_lie_above_a_folder_of_custom_files(tmp_path: Path) -> None:
     assert any("track oval" in value for value in found.used.values())
     assert any("DR_WORKERS" in name for name in found.unused)
     assert not any("No file names a track" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        "DR_LOCAL_S3_CUSTOM_FILES_PREFIX=custom_files/oval/second",
+        "DR_LOCAL_S3_REWARD_KEY=custom_files/oval/second/reward_function.py\n"
+        "DR_LOCAL_S3_MODEL_METADATA_KEY=$DR_LOCAL_S3_CUSTOM_FILES_PREFIX/oval/second/model_metadata.json",
+    ],
+)
+@pytest.mark.parametrize("pack", [models.as_folder, models.as_tar])
+def test_of_several_models_run_env_names_the_one_that_is_meant(named: str, pack: Any, tmp_path: Path) -> None:
+    files = {"run.env": f"DR_WORLD_NAME=oval\n{named}\n"}
+    for place in ("first", "second", "third"):
+        files[f"custom_files/oval/{place}/reward_function.py"] = f"# {place}\n{models.REWARD}"
+        files[f"custom_files/oval/{place}/model_metadata.json"] = models.METADATA.replace(
+            '"speed": 1.0', '"speed": 0.5' if place == "second" else '"speed": 2.0'
+        )
+    found = import_run(pack(files, tmp_path / "racer.tar"), name="mine")
+    folder = RunFolder.open(found.run)
+    assert folder.read_reward_function().startswith("# second")
+    assert folder.read_model_metadata().action_space.most_speed == 0.5
+    assert found.track == "oval"
+    with pytest.raises(SourceError, match="holds 3 models: "):
+        import_run(pack({**files, "run.env": named.replace("second", "fourth")}, tmp_path / "none.tar"))
 
 
 def test_the_page_names_every_setting_that_is_known() -> None:

@@ -13,9 +13,18 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from racecraft.agent.aws_file import AwsModel, Number, Whole, file_model, validate
-from racecraft.errors import did_you_mean
-from racecraft.importing.env_file import EnvFile, EnvSetting
-from racecraft.importing.layout import CUSTOM_FILES, HYPERPARAMETERS, METADATA, REWARD
+from racecraft.errors import SourceError, did_you_mean
+from racecraft.importing.env_file import EnvFile, EnvSetting, parse_env
+from racecraft.importing.layout import (
+    CUSTOM_FILES,
+    HYPERPARAMETERS,
+    METADATA,
+    REWARD,
+    RUN_ENV,
+    find_root,
+    is_of_others,
+)
+from racecraft.importing.source import Source
 from racecraft.race.rules import RULE_SETS, RaceRules
 from racecraft.run.training_params import TrainingParams
 
@@ -50,6 +59,8 @@ FILES: Final = {
 }
 """Settings that say which file of ``custom_files`` is meant: what follows their first part counts."""
 
+CUSTOM_PREFIX: Final = "DR_LOCAL_S3_CUSTOM_FILES_PREFIX"
+"""Which folder the files of a model are taken from, where there are several: deepracer-on-the-spot keeps them so."""
 MODEL_PREFIX: Final = "DR_LOCAL_S3_MODEL_PREFIX"
 PRETRAINED: Final = "DR_LOCAL_S3_PRETRAINED"
 PRETRAINED_PREFIX: Final = "DR_LOCAL_S3_PRETRAINED_PREFIX"
@@ -207,6 +218,27 @@ def read_drfc(env: EnvFile, *, name: str) -> DrfcSettings:
         unknown=unknown,
         notes=tuple(notes),
     )
+
+
+def root_of(source: Source) -> str:
+    """The folder of the model, see `find_root`; of several in ``custom_files`` the one that run.env names is meant.
+
+    Raises:
+        SourceError: There are several models, or nothing that is understood.
+    """
+    try:
+        return find_root(source.files, source=source.title)
+    except SourceError:
+        roots = [name.removesuffix(RUN_ENV) for name in source.files if f"/{name}".endswith(f"/{RUN_ENV}")]
+        for root in sorted((root for root in roots if not is_of_others(root)), key=lambda root: root.count("/"))[:1]:
+            env = parse_env(source.text(root + RUN_ENV), name=RUN_ENV)
+            values = {key: setting.value for key, setting in env.settings.items()}
+            folder = values.get(CUSTOM_PREFIX, "").strip("/")
+            if folder.startswith(f"{CUSTOM_FILES}/") and f"{root}{folder}/{REWARD}" in source.files:
+                return f"{root}{folder}/"
+            if f"{root}{CUSTOM_FILES}/{_files(values)[0].get(REWARD)}" in source.files:
+                return root
+        raise
 
 
 def meaning(name: str) -> str | None:

@@ -17,7 +17,7 @@ from typing import Any, Final
 from racecraft.agent import Hyperparameters, ModelMetadata, action_space
 from racecraft.checks import check_type
 from racecraft.errors import SourceError, TrackNotFound, did_you_mean, printable
-from racecraft.importing.drfc import DrfcSettings, read_drfc
+from racecraft.importing.drfc import DrfcSettings, read_drfc, root_of
 from racecraft.importing.env_file import EnvFile, parse_env
 from racecraft.importing.history import History, keep_history
 from racecraft.importing.job import job_settings
@@ -33,7 +33,6 @@ from racecraft.importing.layout import (
     RUN_ENV,
     SYSTEM_ENV,
     TRAINING_PARAMS,
-    find_root,
     hint_at,
     is_below,
     is_of_others,
@@ -139,7 +138,7 @@ def import_run(
     checkpoint = str(checkpoint)
     with ExitStack() as stack:
         source = stack.enter_context(open_source(path))
-        root_inside = "" if source.reward else find_root(source.files, source=source.title)
+        root_inside = "" if source.reward else root_of(source)
         runs = runs_inside(source.files, root_inside)
         source = replace(source, files={name: file for name, file in source.files.items() if not is_below(name, runs)})
         model = _Model(source, root_inside)
