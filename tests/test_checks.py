@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from racecraft.checks import check_choice, check_flag, check_number, check_type, check_whole, is_number, require
+from racecraft.checks import (
+    check_choice,
+    check_flag,
+    check_number,
+    check_path,
+    check_type,
+    check_whole,
+    is_number,
+    require,
+)
 from racecraft.errors import ConfigError, did_you_mean
 
 COLOURS = ("red", "green")
@@ -98,3 +108,12 @@ def test_a_long_value_is_cut_in_the_message() -> None:
             check()
         assert "xxx…" in str(error.value)
         assert len(str(error.value)) < 700
+
+
+@pytest.mark.parametrize("value", [None, 5, b"file", "a\0b", "half of \ud800 a pair"])
+def test_what_no_file_is_called_is_no_path(value: object) -> None:
+    check_path("output", "file", "use a file's path")
+    check_path("output", Path("file"), "use a file's path")
+    with pytest.raises(ConfigError) as error:
+        check_path("output", value, "use a file's path")
+    assert str(error.value) == f"output is {value!r}; use a file's path."
