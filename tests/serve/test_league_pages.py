@@ -155,9 +155,12 @@ def test_the_teacher_judges_and_ends_it_and_everybody_sees_the_films(lesson: Les
     last = ok(lesson.league.owner.get(f"/api/boards/{race}"))["rows"][1]["name"]
     teacher, pupil = lesson.visits["teacher"].open(f"/league/{race}"), lesson.visits[last].open(f"/league/{race}")
     teacher.get_by_role("button", name=f"Take out: {last}").click()
-    teacher.get_by_label("Reason, which its owner reads").fill("Driven by hand.")
+    teacher.get_by_label("Reason, which its owner reads").fill("Driven by hand. " + 180 * "x")
     teacher.get_by_role("button", name="Take out", exact=True).click()
     pupil.get_by_text("Does not count: Driven by hand.").wait_for()
+    pupil.set_viewport_size({"width": 390, "height": 844})
+    assert lesson.visits[last].overflow() == 0, "whatever words are given as the reason"
+    pupil.set_viewport_size({"width": 1440, "height": 900})
     teacher.get_by_role("button", name=f"Let in again: {last}").click()
     pupil.get_by_text("2 of 2").wait_for()
 
