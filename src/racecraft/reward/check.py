@@ -66,7 +66,7 @@ def check_reward(source: str) -> list[Problem]:
         ConfigError: The source is no text.
     """
     if not isinstance(source, str):
-        from racecraft.checks import check_type  # knows NumPy, which the process that reads a stranger's source does not
+        from racecraft.checks import check_type  # with NumPy, which who reads a stranger's source goes without
 
         check_type("source", source, str, "use the text of a reward function, which load_reward(path) reads")
     try:
