@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
-from racecraft import __version__, _native, cli
+from racecraft import __version__, _native
 from racecraft.training import settings as training_settings
 
 VERBS = (
@@ -82,9 +82,10 @@ def test_the_defaults_in_the_help_are_those_of_the_settings() -> None:
     import inspect
 
     from racecraft import train
+    from racecraft.cli.train import train as typed
     from racecraft.training.regimes import TIME_TRIAL
 
-    shown = {name: parameter.default for name, parameter in inspect.signature(cli.train.train).parameters.items()}
+    shown = {name: parameter.default for name, parameter in inspect.signature(typed).parameters.items()}
     public = {name: parameter.default for name, parameter in inspect.signature(train).parameters.items()}
     settings = training_settings.TrainSettings()
     assert shown["track"] == [settings.track] == [training_settings.DEFAULT_TRACK]
