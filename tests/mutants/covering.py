@@ -100,7 +100,14 @@ COVERING: Final[dict[str, tuple[int, Tests]]] = {
         6,
         ("tests/training/test_stretches.py", "tests/training/test_resume.py", "tests/training/test_many_tracks.py"),
     ),
-    "training/regimes.py": (6, ("tests/training/test_regimes.py", "tests/training/test_training_settings.py")),
+    "training/regimes.py": (
+        6,
+        (
+            "tests/training/test_regimes.py",
+            "tests/training/test_training_settings.py",
+            "tests/training/test_refused_settings.py",
+        ),
+    ),
     "run/stretches.py": (5, ("tests/training/test_stretches.py", "tests/training/test_aws_tools.py")),
     "run/judged.py": (4, ("tests/run/test_judged.py",)),
     "run/closing.py": (1, ("tests/run/test_events.py", "tests/run/test_simtrace.py", "tests/run/test_print_log.py")),
