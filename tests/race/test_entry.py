@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from safetensors.numpy import load
 
 from racecraft import train
 from racecraft.agent import ModelMetadata
@@ -19,10 +20,11 @@ from racecraft.judging.race import race_models
 from racecraft.learn import NetworkSpec, PPOConfig
 from racecraft.race.conditions import STANDARD_CAR
 from racecraft.race.entry import load_entries, load_entry
-from racecraft.race.entry_file import _digest
+from racecraft.race.entry_file import _digest, pack_entry, read_entry_file
 from racecraft.replay import read_replay
-from racecraft.run import CheckpointStore
-from racecraft.run.checkpoint import header_of
+from racecraft.run import CheckpointStore, RunFolder
+from racecraft.run.checkpoint import HEADER_KEY, header_of
+from racecraft.run.tensor_file import tensor_file
 from racecraft.sim import MAX_STEERING, Simulation, Start
 from racecraft.sim.camera import CameraSpec
 from racecraft.sim.vehicle import PRESETS
@@ -405,3 +407,23 @@ def test_choices_among_no_numbers_are_no_choice(honest: Path, run: Path, tmp_pat
     assert own.recording.actions[:, 1].max() == 0.0
     assert others[0].recording.actions[:, 1].max() > 0.0
     assert races.contest.standings[0].car == 0
+
+
+def test_the_digest_is_of_what_drives_and_nothing_else(honest: Path, tmp_path: Path) -> None:
+    data = pack_entry(RunFolder(honest))
+    length = int.from_bytes(data[:8], "little")
+    header, arrays = json.loads(json.loads(data[8 : 8 + length])["__metadata__"][HEADER_KEY]), load(data)
+
+    def digest(arrays: dict[str, Any], **changes: Any) -> str:
+        path = tmp_path / "entry.safetensors"
+        path.write_bytes(b"".join(tensor_file(arrays, {HEADER_KEY: json.dumps({**header, **changes})})))
+        return read_entry_file(path).digest
+
+    same = digest(arrays)
+    metadata = header["model_metadata"]
+    assert digest(arrays, step=1) == same
+    assert digest(dict(reversed(arrays.items())), model_metadata={**metadata, "note": "mine"}) == same
+    name = next(iter(arrays))
+    assert digest({**arrays, name: arrays[name] + np.float32(1e-3)}) != same
+    actions = [{**metadata["action_space"][0], "speed": 0.5}, *metadata["action_space"][1:]]
+    assert digest(arrays, model_metadata={**metadata, "action_space": actions}) != same
