@@ -107,7 +107,8 @@ class Training:
                     reason = self._train(session)
                 return self._result(reason, session)
             except RacecraftError as error:
-                error.hint = error.hint or self.way_on(error)
+                if not error.hint or isinstance(error, RewardError):  # of which a hint says why, not how to go on
+                    error.hint = " ".join(filter(None, (error.hint, self.way_on(error))))
                 raise
             except KeyboardInterrupt:
                 self.reporter.note(
