@@ -229,16 +229,25 @@ def root_of(source: Source) -> str:
     try:
         return find_root(source.files, source=source.title)
     except SourceError:
-        roots = [name.removesuffix(RUN_ENV) for name in source.files if f"/{name}".endswith(f"/{RUN_ENV}")]
-        for root in sorted((root for root in roots if not is_of_others(root)), key=lambda root: root.count("/"))[:1]:
-            env = parse_env(source.text(root + RUN_ENV), name=RUN_ENV)
-            values = {key: setting.value for key, setting in env.settings.items()}
-            folder = values.get(CUSTOM_PREFIX, "").strip("/")
-            if folder.startswith(f"{CUSTOM_FILES}/") and f"{root}{folder}/{REWARD}" in source.files:
-                return f"{root}{folder}/"
-            if f"{root}{CUSTOM_FILES}/{_files(values)[0].get(REWARD)}" in source.files:
-                return root
-        raise
+        root = _root_named(source)
+        if root is None:
+            raise
+        return root
+
+
+def _root_named(source: Source) -> str | None:
+    """The folder of the model that the outermost run.env names; None where it names none that is there."""
+    roots = (name.removesuffix(RUN_ENV) for name in source.files if f"/{name}".endswith(f"/{RUN_ENV}"))
+    ours = (root for root in roots if not is_of_others(root))
+    root = min(ours, key=lambda root: root.count("/"), default=None)
+    if root is None:
+        return None
+    env = parse_env(source.text(root + RUN_ENV), name=RUN_ENV)
+    values = {key: setting.value for key, setting in env.settings.items()}
+    folder = values.get(CUSTOM_PREFIX, "").strip("/")
+    if folder.startswith(f"{CUSTOM_FILES}/") and f"{root}{folder}/{REWARD}" in source.files:
+        return f"{root}{folder}/"
+    return root if f"{root}{CUSTOM_FILES}/{_files(values)[0].get(REWARD)}" in source.files else None
 
 
 def meaning(name: str) -> str | None:
